@@ -12,9 +12,8 @@ Its public words are loaded when they are used, so that importing ringsim costs 
 """
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
-
-from ringsim.on_import import when_imported
 
 if TYPE_CHECKING:
     from ringsim.analysis.comparison import compare
@@ -43,6 +42,7 @@ def __getattr__(name: str) -> Any:
     """Load a public word on its first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    _register()
     return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
 
 
@@ -52,9 +52,8 @@ def __dir__() -> list[str]:
 
 def _register() -> None:
     """Let datasets have ``dataset.ring``."""
-    from ringsim.analysis.accessor import register
-
-    register()
+    importlib.import_module(f"{__name__}.analysis")
 
 
-when_imported("xarray", _register)
+if "xarray" in sys.modules:  # which takes most of a second; else with the first word that is used
+    _register()

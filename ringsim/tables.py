@@ -38,6 +38,7 @@ class Table(NamedTuple):
     notes: Sequence[str] = ()
     left: int = 1
     """How many of its columns are words."""
+    title: str = ""
 
     def lines(self) -> list[str]:
         """The table as text; notes alone if it has no rows."""
@@ -56,6 +57,7 @@ def slim(table: Table) -> Table:
         [tuple(row[k] for k in kept) for row in table.rows],
         table.notes,
         table.left,
+        table.title,
     )
 
 

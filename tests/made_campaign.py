@@ -104,8 +104,8 @@ def made_campaign(
         says = {"role": "input", "path": path, "units": units, "distribution": law}
         found[name] = (dims, values, says)
     text = TEXT.format(kind=kind, samples=samples)
-    wanted = json.dumps(tomllib.loads(text)["requirements"])
-    found.attrs |= {"campaign": text, "requirements": wanted, "campaign_name": "made",
+    stored = {name: json.dumps(tomllib.loads(text)[name]) for name in ("design", "requirements")}
+    found.attrs |= {"campaign": text, **stored, "campaign_name": "made",
                     "title": "Made by hand <&> quoted", "seed": 3}  # fmt: skip
     return found
 

@@ -1,4 +1,8 @@
-"""What every dataset of ringsim can be asked as ``dataset.ring``."""
+"""What every dataset of ringsim can be asked as ``dataset.ring``.
+
+It is there once a public word of ringsim has been used, or ringsim was imported after xarray; else
+``import ringsim.analysis``.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,13 +12,12 @@ import xarray as xr
 if TYPE_CHECKING:
     import pandas as pd
 
-NAME = "ring"
 
-
+@xr.register_dataset_accessor("ring")  # type: ignore[no-untyped-call]
 class Ring:
     """Questions to a run or a campaign: ``dataset.ring.outcomes()`` and others.
 
-    Imports stand in the methods: it is there wherever xarray and ringsim are, and costs nothing.
+    Imports stand in the methods: to have it costs nothing.
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
@@ -60,6 +63,30 @@ class Ring:
         rows.attrs |= self._losses()
         return rows
 
+    def tables(self, *, full: bool = False) -> "dict[str, pd.DataFrame]":
+        """What ``ringsim analyse`` and the report tell of a campaign, or of an analysis of it: the
+        same tables, cells as text, by their titles or else the heads of their first columns; what
+        stands below them is ``notes`` among their ``attrs``.
+
+        ``full`` has every statistic with its interval, and every measure of what matters.
+        InputError if it is no campaign, or its requirements cannot be judged.
+        """
+        import pandas as pd
+
+        from ringsim.analysis.study import analyse
+        from ringsim.analysis.study_text import sections
+
+        own = self._dataset
+        analysis = own if "statistic" in own.dims else analyse(own)
+        found = {}
+        for each in sections(analysis, self._folder()).values():
+            for table in each.more if full and each.more else each.tables:
+                if table.rows:
+                    rows = pd.DataFrame(table.rows, columns=table.head)
+                    rows.attrs["notes"] = list(table.notes)
+                    found[table.title or table.head[0]] = rows
+        return found
+
     def worst(self) -> "pd.DataFrame":
         """The worst samples of each failure of a campaign, the worst first: of requirements of its
         file that are violated, of outcomes that fall short, of runs that were lost.
@@ -74,7 +101,7 @@ class Ring:
         import pandas as pd
 
         from ringsim.analysis.design import population_of, requirements_of
-        from ringsim.analysis.verdicts import read_requirements
+        from ringsim.analysis.requirements import read_requirements
         from ringsim.analysis.worst import COLUMNS, command, worst
 
         self._require_samples("worst samples")
@@ -83,11 +110,14 @@ class Ring:
         columns: dict[str, Any] = {
             name: found[f"worst_{name}"].to_numpy() if found else [] for name in COLUMNS
         }
+        again = [command(self._folder(), sample) for sample in columns["sample"]]
+        return pd.DataFrame(columns | {"replay": again})
+
+    def _folder(self) -> str:
+        """The folder that the dataset was opened from, by default runs/NAME."""
         source = str(self._dataset.encoding.get("source", ""))
         name = self._dataset.attrs.get("campaign_name", "")
-        folder = str(Path(source).parent) if source else f"runs/{name}"
-        again = [command(folder, sample) for sample in columns["sample"]]
-        return pd.DataFrame(columns | {"replay": again})
+        return str(Path(source).parent) if source else f"runs/{name}"
 
     def fan(self, quantiles: tuple[float, ...] = (0.0, 0.05, 0.5, 0.95, 1.0)) -> xr.DataArray:
         """Quantiles over the samples of each V-joint's deviation from the mean opening angle.
@@ -126,9 +156,3 @@ class Ring:
                 f"{what}: only a campaign has them, and this holds no samples: open one with "
                 "ringsim.open_campaign"
             )
-
-
-def register() -> None:
-    """Let all datasets have it; once, since xarray warns of a second time."""
-    if getattr(xr.Dataset, NAME, None) is not Ring:
-        xr.register_dataset_accessor(NAME)(Ring)  # type: ignore[no-untyped-call]

@@ -9,7 +9,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
-from ringsim.analysis.design import Placement, called, placement, population_of, requirements_of
+from ringsim.analysis.design import (
+    LOST,
+    Placement,
+    called,
+    endings,
+    placement,
+    population_of,
+    requirements_of,
+)
 from ringsim.analysis.intervals import (
     NONE,
     Mask,
@@ -20,19 +28,18 @@ from ringsim.analysis.intervals import (
     numbers,
     quantities,
 )
-from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.verdicts import (
+from ringsim.analysis.requirements import (
     OUTCOME,
     Requirement,
     read_requirements,
     require_values,
     violations,
 )
+from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import NOTE, losses, marked
 from ringsim.refusal import InputError
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, interval_text, number_text, slim
-from ringsim.variables import Fate, Status
 
 # What shares of two campaigns ended how, and kept to what is required: their differences.
 
@@ -59,13 +66,11 @@ def differences_of_shares(both: Both, placed: Placements, pairs: Places) -> dict
     For either, with ``kind_`` or ``kept_``: ``samples`` (side), ``share`` (side) of those compared,
     ``compared`` (side), ``share_difference``, second minus first, and its ``_interval`` (bound).
     """
-    words = (ends(both[0]), ends(both[1]))
+    words = (endings(both[0]), endings(both[1]))
     held = good(both[0]), good(both[1])
     ran = held[0] | lost(both[0]), held[1] | lost(both[1])
     kinds = {
-        kind: Event(
-            (words[0] == kind, words[1] == kind), ran if kind.startswith("lost: ") else held
-        )
+        kind: Event((words[0] == kind, words[1] == kind), ran if kind.startswith(LOST) else held)
         for kind in sorted({*words[0].tolist(), *words[1].tolist()})
     }
     found = {"kind": ("kind", np.array([*kinds], dtype=object), {"long_name": "how it ended"})}
@@ -84,17 +89,6 @@ def has_means(both: Both, placed: Placements, pairs: int) -> bool:
     if any(subset_simulation(each) is not None for each in both):
         return False
     return pairs > 0 or all(each.population for each in placed)
-
-
-def ends(campaign: xr.Dataset) -> NDArray[Any]:
-    """How each sample ended, in a word, shape (sample,)."""
-    fates, status = campaign[OUTCOME].to_numpy(), campaign["status"].to_numpy()
-    words = [
-        Fate(max(int(fate), 0)).word.replace("none", "unknown") if code == Status.OK
-        else "not run" if code < 0 else f"lost: {Status(int(code)).word}"
-        for fate, code in zip(fates, status, strict=True)
-    ]  # fmt: skip
-    return np.array(words, dtype=object)
 
 
 def _kept(both: Both, held: tuple[Mask, Mask]) -> dict[str, Event]:
@@ -381,7 +375,7 @@ def _interval(apart: Array, replicate: Indices | None) -> tuple[Any, Any]:
 def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any]:
     """The pairs in which the outcome is another one."""
     places = pairs.first, pairs.second
-    one, other = (ends(each)[k] for each, k in zip(both, places, strict=True))
+    one, other = (endings(each)[k] for each, k in zip(both, places, strict=True))
     changed, found = np.flatnonzero(one != other), dict[str, Any]()
     for side, dataset, place, words in zip(SIDES, both, places, (one, other), strict=True):
         found[f"changed_sample_{side}"] = (
@@ -389,7 +383,8 @@ def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any
             {"long_name": f"sample of the {side} whose outcome is another", "units": "1"},
         )  # fmt: skip
         found[f"changed_outcome_{side}"] = (
-            "change", words[changed], {"long_name": f"how the sample of the {side} ended"},
+            "change", words[changed].astype(object),
+            {"long_name": f"how the sample of the {side} ended"},
         )  # fmt: skip
     return found
 
@@ -423,7 +418,7 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> list[str]:
         counts = one[f"{word}_compared"].tolist()
         low, high = one[f"{word}_share_difference_interval"].tolist()
         rows.append((
-            str(name).replace("_", " ") if word == "kind" else str(name),
+            str(name),
             *map(str, one[f"{word}_samples"]),
             *(number_text(share, 3) for share in one[f"{word}_share"]),
             number_text(one[f"{word}_share_difference"].item(), 3),
@@ -454,7 +449,7 @@ def _outcomes(found: xr.Dataset) -> Iterator[str]:
         if (changed := changed - 1) == found.sizes["change"] - _NAMED - 1:
             yield "  ..., all of them in the file of --out"
             return
-        yield f"  sample {sample}: {first}, then {second}".replace("_", " ")
+        yield f"  sample {sample}: {first}, then {second}"
 
 
 def _outputs(found: xr.Dataset) -> Iterator[str]:

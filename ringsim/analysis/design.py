@@ -1,5 +1,6 @@
 """How the samples of a campaign were placed, and what was read of them."""
 
+import functools
 import hashlib
 import json
 import tomllib
@@ -15,14 +16,13 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.intervals import good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
-from ringsim.files import parse_toml
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import BLOCK_ROW
 from ringsim.sampling.designs.blocks import Grouped, stretches
 from ringsim.sampling.designs.family import Design
 from ringsim.stepping.instant import Array
-from ringsim.variables import Fate, Status
+from ringsim.variables import GOALS, Fate, Status
 
 # The blocks of runs that designs for Sobol' indices and for screening are made of.
 
@@ -153,14 +153,7 @@ def placement_of(design: Design) -> Placement:
 
 def placement(campaign: xr.Dataset) -> Placement:
     """The placement that a merged campaign tells, or one of no population."""
-    if "design" in campaign.attrs:
-        table = json.loads(campaign.attrs["design"])
-    else:  # files that are older than the attribute have the text of the campaign
-        try:
-            text = parse_toml(str(campaign.attrs.get("campaign", "")), "campaign")
-        except InputError:
-            text = {}
-        table = text.get("design", {})
+    table = json.loads(campaign.attrs.get("design", "{}"))
     kind = kinds_of(Design).get(str(table.get("kind")))
     if kind is None or not issubclass(kind, Design):
         return Placement("", population=False, independent=False)
@@ -179,26 +172,50 @@ NUMERICAL = ("energy_error", "constraint_error")
 _EFFORT = ("wall_time",)
 
 
+LOST = "lost: "
+"""How the words begin for what became of a run whose numbers do not hold."""
+UNKNOWN, NOT_RUN = "unknown", "not run"
+REACHED = tuple(fate.word.replace("_", " ") for fate in GOALS)
+"""What became of those that reached their goal."""
+
+
 def endings(campaign: xr.Dataset) -> NDArray[np.str_]:
     """What became of each sample in words: an outcome, or why its numbers do not hold; (sample,).
 
     >>> codes = {"status": ("sample", [0, 0, 7, -1]), "outcome": ("sample", [1, 3, 0, -1])}
     >>> endings(xr.Dataset(codes)).tolist()
-    ['deployed', 'stalled', 'failed: memory', 'not run']
+    ['deployed', 'stalled', 'lost: memory', 'not run']
     """
     status = campaign["status"].to_numpy()
     fates = campaign["outcome"].to_numpy() if "outcome" in campaign else np.zeros_like(status)
-    known = {int(fate) for fate in Fate}
-    words = []
-    for code, fate in zip(status.tolist(), fates.tolist(), strict=True):
-        if code < 0:
-            words.append("not run")
-        elif Status(code).failed:
-            words.append(f"failed: {Status(code).word.replace('_', ' ')}")
-        else:
-            named = Fate(fate) if fate in known else Fate.NONE
-            words.append("ok" if named == Fate.NONE else named.word.replace("_", " "))
-    return np.array(words, dtype=str)
+    return endings_of(status, fates)
+
+
+def endings_of(status: NDArray[Any], fates: NDArray[Any]) -> NDArray[np.str_]:
+    """The same from the codes of samples, shape (sample,)."""
+    fates = np.where(np.isin(fates, [int(fate) for fate in Fate]), fates, Fate.NONE)
+    return np.array([_word(*codes) for codes in zip(status.tolist(), fates.tolist(), strict=True)])
+
+
+@functools.cache
+def _word(code: int, fate: int) -> str:
+    if code < 0:
+        return NOT_RUN
+    word = f"{LOST}{Status(code).word}" if Status(code).failed else Fate(fate).word
+    return UNKNOWN if word == Fate.NONE.word else word.replace("_", " ")
+
+
+def kinds_of_ends(words: NDArray[np.str_]) -> list[str]:
+    """The different words, outcomes before losses, without what has not run."""
+    every = [Fate.NONE, *Fate], [*Status]
+    order = [_word(0, fate) for fate in every[0]] + [_word(code, 0) for code in every[1]]
+    return [word for word in dict.fromkeys(order) if word != NOT_RUN and (words == word).any()]
+
+
+def short_of_goal(words: NDArray[np.str_]) -> list[str]:
+    """The outcomes among words that fall short of the goal."""
+    known = kinds_of_ends(words)
+    return [w for w in known if w not in (*REACHED, UNKNOWN) and not w.startswith(LOST)]
 
 
 def told(campaign: xr.Dataset, counted: int) -> str:
@@ -257,9 +274,7 @@ def inputs(campaign: xr.Dataset) -> list[str]:
     found: dict[str, str] = {}
     for name, variable in campaign.data_vars.items():
         if variable.attrs.get("role") == "input":
-            # Files of older runs tell the paths that share values, and no name.
-            told = str(variable.attrs.get("input") or paths_of(variable))
-            found.setdefault(told, str(name))
+            found.setdefault(called(variable), str(name))
     return [*found.values()]
 
 
@@ -282,9 +297,7 @@ def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
 
 def requirements_of(campaign: xr.Dataset) -> dict[str, dict[str, Any]]:
     """What the campaign requires of its numbers: tables with min, max or is, by name."""
-    stored = campaign.attrs.get("requirements")
-    wanted = json.loads(stored) if stored else campaign_file(campaign).get("requirements", {})
-    return {name: each for name, each in wanted.items() if {"min", "max", "is"} & each.keys()}
+    return dict(json.loads(campaign.attrs.get("requirements", "{}")))
 
 
 def distribution_of(variable: xr.DataArray) -> dict[str, Any]:

@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from ringsim.analysis import indices
-from ringsim.analysis.design import Drawn, Placement, drawn
+from ringsim.analysis.design import Drawn, Placement, drawn, endings, short_of_goal
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
 from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used
+from ringsim.analysis.requirements import Requirement, violations
 from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.verdicts import OUTCOME, Requirement, violations
 from ringsim.refusal import InputError
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted
-from ringsim.variables import GOALS, Fate
 
 # Pairs of inputs that go together, so that the effect of one may be told as the other's.
 
@@ -286,9 +285,8 @@ def groups_of(
     """
     ok, gone = good(campaign), lost(campaign)
     found = {"lost": (gone, ok | gone)}
-    for fate in Fate:
-        if fate not in GOALS and fate != Fate.NONE and OUTCOME in campaign:
-            found[fate.word.replace("_", " ")] = (ok & (campaign[OUTCOME].to_numpy() == fate), ok)
+    words = endings(campaign)
+    found |= {word: (words == word, ok) for word in short_of_goal(words)}
     for name, wanted in requirements.items():
         found[f"violates {wanted.told(name)}"] = (violations(campaign, name, wanted), ok)
     alike: dict[bytes, list[str]] = {}

@@ -1,41 +1,40 @@
-"""What matters, as lines for people."""
+"""What matters, as tables: in short only what stands out of chance, then every measure."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
+from scipy.stats import norm
 
+from ringsim.analysis import indices
 from ringsim.analysis.indices import UNLIKELY
-from ringsim.analysis.influence import confounding_notes
+from ringsim.analysis.influence import confounding_notes, partners
 from ringsim.analysis.intervals import LEVEL, quantities
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, interval_text, number_text
 
-# What matters, as lines for people.
+# Every measure: the largest rank correlations, indices and areas of each output.
 
 
 _NAMED = {False: 5, True: 3}
 """Inputs that are told for each output and group, and single places of such that have many."""
 
 
-def influence_tables(
-    analysis: xr.Dataset, outputs: Collection[str] | None = None
-) -> tuple[Table, ...]:
-    """The inputs that go with each output most (of ``outputs``, by default of all), and that
-    separate each group best.
-    """
+def influence_tables(analysis: xr.Dataset) -> tuple[Table, ...]:
+    """The inputs that go with each output most, and that separate each group best."""
     if "input_is_place" not in analysis:  # too few samples
         return ()
-    found = [_correlated(analysis, quantities() if outputs is None else outputs)]
+    found = [_correlations_table(analysis)]
     return (*found, _separated(analysis)) if "group" in analysis.dims else (*found,)
 
 
-def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
+def _correlations_table(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
     rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
     named = set[str]()
-    for output in outputs:
+    for output in quantities():
         if f"{output}_rank_correlation" not in analysis:
             continue
         plain, partial = (
@@ -106,7 +105,7 @@ def directed(middle: Array, ends: Array, k: int) -> tuple[str, str, str]:
     return "smaller", *_with_interval(1.0 - middle, 1.0 - ends[:, ::-1], k)
 
 
-def _largest(values: Array, place: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[int]:
+def _largest(values: Array, place: NDArray[np.bool_]) -> list[int]:
     """The largest ones of inputs, then of places, among which chance has more."""
     size = np.abs(np.where(np.isnan(values), 0.0, values))
     order = np.argsort(-size, kind="stable")
@@ -120,8 +119,6 @@ def _with_interval(middle: Array, ends: Array, k: int) -> tuple[str, str]:
 # Indices of sensitivity as lines for people.
 
 
-Outputs = Collection[str] | None
-"""Names of outputs to tell of beside failures; None for all."""
 _MOST = 5
 """Groups or inputs that are told for each output."""
 _MOST_PLACES = 3
@@ -150,7 +147,7 @@ def _ends(interval: Array) -> str:
     return interval_text(float(interval[0]), float(interval[1]), 2)
 
 
-def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Table:
+def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
     """The groups, or inputs, that matter most for each output."""
     (dim,) = analysis[names[0]].dims[1:]
     place = (
@@ -163,7 +160,7 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Tab
     for name in names:
         head += [HEADS[name]] + ["95 % interval"] * (f"{name}_interval" in analysis)
     rows, named = [], set[str]()
-    for output in chosen_of(analysis, outputs):
+    for output in analysis["output"].values.tolist():
         one = analysis.sel(output=output)
         size = np.nan_to_num(one[names[0]].values, nan=-np.inf)
         order = np.argsort(-size, kind="stable")
@@ -182,13 +179,13 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Tab
     return marked(Table([*head, f"{of} used", "lost"], rows, notes), analysis)
 
 
-def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
+def _gate(analysis: xr.Dataset) -> Iterator[str]:
     """What became of outputs that samples lack: why there is no index, or why there is one."""
     if "missing_by_inputs" not in analysis:
         return
     outputs: dict[tuple[int, int, float], list[str]] = {}
     blocks = ", and the rest of their blocks," if "factor" in analysis.dims else ""
-    for output in chosen_of(analysis, only):
+    for output in analysis["output"].values.tolist():
         one = analysis.sel(output=output)
         if count := one["missing"].item():
             chance = round(one["missing_by_inputs"].item(), 4)
@@ -213,14 +210,14 @@ def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
             )
 
 
-def sensitivity_tables(analysis: xr.Dataset, outputs: Outputs = None) -> list[Table]:
-    """Indices of failures and of ``outputs``, by default of all, and what they leave out."""
+def sensitivity_tables(analysis: xr.Dataset) -> list[Table]:
+    """Indices of outputs and failures, and what they leave out."""
     found = []
     if names := next((names for names in SETS if names[0] in analysis), ()):
-        found.append(_told(analysis, names, outputs))
+        found.append(_told(analysis, names))
     if "second_order_index" in analysis:
-        found.append(_second(analysis, outputs))
-    return found + refusals(analysis, outputs)
+        found.append(_second(analysis))
+    return found + refusals(analysis)
 
 
 def measure_notes(analysis: xr.Dataset) -> list[str]:
@@ -275,21 +272,15 @@ def _farthest(values: Array) -> float:
     return float(known[np.argmax(np.abs(known - 0.5))]) if len(known) else np.nan
 
 
-def refusals(analysis: xr.Dataset, outputs: Outputs = None) -> list[Table]:
+def refusals(analysis: xr.Dataset) -> list[Table]:
     """What became of outputs that samples lack, as notes."""
-    lines = list(_gate(analysis, outputs))
+    lines = list(_gate(analysis))
     return [Table((), (), lines)] if lines else []
 
 
-def chosen_of(analysis: xr.Dataset, outputs: Outputs) -> list[str]:
-    """Of the outputs with indices those to tell of: failures are no quantities."""
-    known = analysis["output"].values.tolist()
-    return [n for n in known if outputs is None or n in outputs or n not in quantities()]
-
-
-def _second(analysis: xr.Dataset, outputs: Outputs) -> Table:
+def _second(analysis: xr.Dataset) -> Table:
     rows, factors = [], analysis["factor"].values
-    for output in chosen_of(analysis, outputs):
+    for output in analysis["output"].values.tolist():
         one = analysis.sel(output=output)
         values = one["second_order_index"].values
         found = [(j, k) for j in range(len(factors)) for k in range(j) if np.isfinite(values[j, k])]
@@ -299,3 +290,190 @@ def _second(analysis: xr.Dataset, outputs: Outputs) -> Table:
                          number_text(values[j, k], 2), _ends(ends)))  # fmt: skip
     head = ("what explains", "second-order index", "95 % interval")
     return marked(Table(head, rows), analysis)
+
+
+# In short: of what matters only what stands out of chance.
+
+
+_MOST_IN_SHORT = 3
+"""Inputs that are told for each output."""
+_RANKS = {"partial_": "partial rank correlation", "": "rank correlation"}
+"""Of rank correlations the one that holds the other inputs first, with their heads."""
+_CHANCE = {"given_data_index": "chance_level"}
+"""Measures that chance lifts, and how far."""
+
+
+def what_matters(analysis: xr.Dataset) -> Table:
+    """Inputs (or groups) that go with each output beyond chance, by the measure of the design, and
+    in which direction.
+    """
+    measure = next((first for first, _ in SETS if first in analysis), None)
+    if measure is None and "input_is_place" not in analysis:
+        return Table((), ())
+    rows, quiet, doubtful = [], [], list[str]()
+    told = dict(_indexed(analysis, measure)) if measure else {}
+    known = _correlated(analysis)
+    groups = [name for name in told if name not in quantities()]
+    for output in [n for n in quantities() if n in told or n in known] + groups:
+        found = told[output] if output in told else list(_ranked(analysis, output))
+        found, others = _cleared(analysis, output, found)
+        doubtful += [f"{output} by {name}" for name in others[:_MOST_IN_SHORT]]
+        rows += [(output if k == 0 else "", *row) for k, row in enumerate(found[:_MOST_IN_SHORT])]
+        if not found:
+            quiet.append(output)
+    notes = measure_notes(analysis)
+    if rows and "input" in analysis.dims and "factor" not in analysis.dims:
+        count = analysis.sizes["input"]
+        largest = f"the largest of all {count} would reach" if count > 1 else "it would reach"
+        notes.append(
+            f"an input is told if by chance {largest} as much in fewer than one output of 20"
+        )
+        notes += confounding_notes(analysis, {row[1] for row in rows})
+    if doubtful:
+        notes.append(
+            "not told, because an input of larger index that goes with it explains it (its partial "
+            f"rank correlation is within chance): {', '.join(doubtful)}"
+        )
+    if quiet:
+        notes.append(f"no input stands out of chance for {', '.join(quiet)}")
+    index = "index" if measure is None else HEADS[measure]
+    head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
+    return marked(Table(head, rows, notes, left=2), analysis, 1)
+
+
+def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+    """For each output with indices the inputs with more than chance gives, in all their interval
+    above zero.
+    """
+    (dim,) = analysis[measure].dims[1:]
+    for output in analysis["output"].values.tolist():
+        one = analysis.sel(output=output)
+        values = one[measure].values
+        known = f"{measure}_interval" in one and np.isfinite(one[f"{measure}_interval"]).any()
+        ends = one[f"{measure}_interval"].values if known else np.full((len(values), 2), np.nan)
+        chance = one[_CHANCE[measure]].values if measure in _CHANCE else 0.0 * values
+        least = np.where(np.isfinite(ends[:, 0]), ends[:, 0], values)
+        beyond = (values > chance) & (least > 0.0)
+        chosen = [k for k in np.argsort(-np.nan_to_num(values)) if beyond[k]]
+        if np.isfinite(values).any():
+            yield output, [
+                (
+                    str(analysis[dim].values[k]), number_text(values[k], 2),
+                    _ends(ends[k]),
+                    *_correlations(analysis, output, str(analysis[dim].values[k])),
+                )
+                for k in chosen
+            ]  # fmt: skip
+
+
+def _cleared(
+    analysis: xr.Dataset, output: str, found: list[tuple[str, ...]]
+) -> tuple[list[tuple[str, ...]], list[str]]:
+    """The rows, the largest first, of inputs whose index cannot be that of another one, and the
+    names of the others: they go with an input of a larger index, and their partial rank
+    correlation, which holds that, is within chance.
+    """
+    paired = partners(analysis)
+    # Blocks move one group by itself: their indices are its own.
+    if not paired or "factor" in analysis.dims or output not in _correlated(analysis):
+        return found, []
+    partial = analysis[f"{output}_partial_rank_correlation"].values
+    clear = np.isnan(partial) | standing_out(analysis, output)[1]
+    stands = dict(zip(analysis["input"].values.tolist(), clear.tolist(), strict=True))
+    kept, others = list[tuple[str, ...]](), list[str]()
+    for row in found:
+        larger = {each[0] for each in kept}
+        if stands[row[0]] or paired.get(row[0], set()).isdisjoint(larger):
+            kept.append(row)
+        else:
+            others.append(row[0])
+    return kept, others
+
+
+def _correlated(analysis: xr.Dataset) -> list[str]:
+    end = "_rank_correlation"
+    return [
+        str(name).removesuffix(end)
+        for name in analysis.data_vars
+        if str(name).endswith(end) and not str(name).endswith(f"_partial{end}")
+    ]
+
+
+def _ranked(analysis: xr.Dataset, output: str) -> Iterator[tuple[str, ...]]:
+    """Inputs whose rank correlation with an output without index is beyond chance: the partial one
+    where samples are enough to hold the other inputs.
+    """
+    if output not in _correlated(analysis):
+        return
+    values, beyond = standing_out(analysis, output)
+    for k in np.argsort(-np.abs(np.nan_to_num(values)), kind="stable"):
+        if beyond[k]:
+            name = str(analysis["input"].values[k])
+            yield name, "-", "-", *_correlations(analysis, output, name)
+
+
+def standing_out(analysis: xr.Dataset, output: str) -> tuple[Array, NDArray[np.bool_]]:
+    """Rank correlations of all inputs, partial where there are such, and which of them stand out
+    of what the largest reaches by chance; shape (input,) both.
+    """
+    (values, ends), (plain, plain_ends) = (
+        (analysis[name].values, analysis[f"{name}_interval"].values)
+        for name in (f"{output}_{word}rank_correlation" for word in _RANKS)
+    )
+    partial = np.isfinite(values)
+    values, ends = np.where(partial, values, plain), np.where(partial[:, None], ends, plain_ends)
+    samples = int(analysis[f"{output}_samples"].values[0])
+    held = np.where(partial, analysis["inputs_held"].values, 0)
+    chance = indices.largest_by_chance(samples, held, len(values))
+    return values, _beyond(values, ends, chance)
+
+
+def _correlations(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ...]:
+    """The cells of an input's rank correlations."""
+    if output not in _correlated(analysis) or name not in analysis["input"].values:
+        return ("-",) * len(_RANKS)
+    one = analysis.sel(input=name)
+    known = (f"{output}_{word}rank_correlation" for word in _RANKS)
+    return tuple(_signed(one[each].item(), one[f"{each}_interval"].values) for each in known)
+
+
+def _signed(value: float, ends: Array) -> str:
+    if not np.isfinite(value):
+        return "-"
+    interval = _ends(ends)
+    return f"{value:+.2f}" + ("" if interval == "-" else f" ({interval})")
+
+
+def what_separates(analysis: xr.Dataset) -> Table:
+    """Inputs that are larger, or smaller, in samples that ended otherwise or violate."""
+    if "group" not in analysis.dims:
+        return Table((), ())
+    rows, samples = [], analysis.attrs["samples_run"]
+    normal = float(norm.isf(indices.chance_of_each(analysis.sizes["input"]) / 2))
+    for group in analysis["group"].values:
+        one = analysis.sel(group=group)
+        middle, ends = one["separation"].values, one["separation_interval"].values
+        order = np.argsort(-np.abs(np.nan_to_num(middle - 0.5)))
+        own = one["group_samples"].item()
+        # Variance of the area under the curve without a difference: Mann and Whitney (1947).
+        chance = normal * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
+        beyond = _beyond(middle - 0.5, ends - 0.5, chance)
+        chosen = [k for k in order if beyond[k]]
+        first = str(group).split("; ")[0]
+        rows += [
+            (
+                f"{first} ({one['group_samples'].item()})" if n == 0 else "",
+                str(analysis["input"].values[k]), *directed(middle, ends, k),
+            )
+            for n, k in enumerate(chosen[:_MOST_IN_SHORT])
+        ]  # fmt: skip
+    head = ("what separates", "input", *DIRECTED)
+    return marked(Table(head, rows, left=3), analysis, 1)
+
+
+def _beyond(values: Array, ends: Array, chance: Array | float) -> NDArray[np.bool_]:
+    """Which values are larger than the largest of all by chance, and if they have intervals leave
+    out zero by these, too.
+    """
+    apart = (ends[:, 0] > 0.0) | (ends[:, 1] < 0.0)
+    return (np.abs(values) > chance) & (apart | ~np.isfinite(ends).all(axis=1))

@@ -28,7 +28,7 @@ LARGE = 2000
 """Samples from which on the normal limit is taken: there it differs from the bootstrap by less than
 the bootstrap from itself with another seed, and scipy's takes a time of the square of the samples.
 """
-_LEAST = 8
+LEAST_OF_BOOTSTRAP = 8
 """Samples below which bootstrap intervals are too short, Efron and Tibshirani (1993)."""
 _FLAT = 0.5
 """Least fourth moment over the variance's square, less 1, that is believed of a resample: few
@@ -55,7 +55,7 @@ def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array,
     spread that of ``_of_spread``; from LARGE samples on the normal limit.  NaN below 8 samples.
     """
     count = values.shape[-1]
-    if count < _LEAST:
+    if count < LEAST_OF_BOOTSTRAP:
         none = np.full(values.shape[:-1], np.nan)
         return none, none
     if count > LARGE:

@@ -11,7 +11,15 @@ from pydantic import ValidationError
 from scipy.optimize import brentq
 from scipy.stats import beta, t
 
-from ringsim.analysis.design import Placement, called, inputs, paths_of
+from ringsim.analysis.design import (
+    LOST,
+    Placement,
+    called,
+    endings,
+    inputs,
+    kinds_of_ends,
+    paths_of,
+)
 from ringsim.analysis.indices import replicate_interval
 from ringsim.analysis.intervals import (
     LEVEL,
@@ -25,7 +33,8 @@ from ringsim.analysis.intervals import (
     ran,
     standard_error,
 )
-from ringsim.analysis.verdicts import OUTCOME, Requirement, Verdict, rule_of, verdict_of, violations
+from ringsim.analysis.requirements import OUTCOME, Requirement, violations
+from ringsim.analysis.verdicts import Verdict, rule_of, verdict_of
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml
 from ringsim.overrides import parse_value
@@ -34,7 +43,7 @@ from ringsim.sampling.distributions import Discrete, Distribution, inside
 from ringsim.sampling.table import AnyDistribution
 from ringsim.stepping.instant import Array
 from ringsim.units import Model
-from ringsim.variables import Fate, flags_of
+from ringsim.variables import flags_of
 
 # Estimates from samples with weights, and their intervals.
 
@@ -556,8 +565,9 @@ def _events(
     """What may happen to a sample: which samples it happened to, of which."""
     found: dict[str, tuple[Mask, Mask]] = {}
     if OUTCOME in campaign and ok.any():
-        fates = campaign[OUTCOME].to_numpy()
-        found = {f.word: (ok & (fates == f), ok) for f in Fate if (ok & (fates == f)).any()}
+        words = endings(campaign)
+        kinds = [word for word in kinds_of_ends(words) if not word.startswith(LOST)]
+        found = {word: (words == word, ok) for word in kinds}
     if gone.any():
         found["lost"] = gone, ok | gone
     for name, each in requirements.items() if ok.any() else ():

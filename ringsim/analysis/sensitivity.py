@@ -16,7 +16,7 @@ from ringsim.analysis.design import Blocks, Placement, blocks_of, drawn, populat
 from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.influence import groups_of
 from ringsim.analysis.intervals import good, lost, numbers, quantities, ran
-from ringsim.analysis.verdicts import Requirement
+from ringsim.analysis.requirements import Requirement
 from ringsim.stepping.instant import Array
 
 _LEAST_OF_A_KIND = 10

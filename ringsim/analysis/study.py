@@ -1,7 +1,7 @@
 """What the samples of a campaign say about its population: estimates, intervals, verdicts."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -10,11 +10,19 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from ringsim.analysis import intervals
 from ringsim.analysis.accuracy import in_favour, settings_at
-from ringsim.analysis.design import Placement, placement, population_of
+from ringsim.analysis.design import (
+    LOST,
+    NUMERICAL,
+    Placement,
+    endings,
+    kinds_of_ends,
+    placement,
+    population_of,
+)
 from ringsim.analysis.engines import GROUPS, OUTPUTS
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import (
@@ -29,11 +37,12 @@ from ringsim.analysis.intervals import (
     share_interval,
     worst_sample,
 )
+from ringsim.analysis.requirements import Requirement, read_requirements
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import tail
-from ringsim.analysis.verdicts import OUTCOME, Requirement, judge, read_requirements, stopping_lines
-from ringsim.analysis.worst import LOST, NOTE, losses, worst
+from ringsim.analysis.verdicts import judge, stopping_lines
+from ringsim.analysis.worst import NOTE, losses, worst
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml, read_text
 from ringsim.parts.solver import NO_DEVIATIONS
@@ -41,7 +50,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.stepping.instant import Array
 from ringsim.units import ListIn, Model
-from ringsim.variables import Fate, Status
+from ringsim.variables import Status
 
 # What the samples of a campaign say about its population: estimates, intervals, verdicts.
 
@@ -79,11 +88,14 @@ def analyse(
     xarray.Dataset
         For every output NAME ``NAME`` (statistic), ``NAME_interval`` (statistic, bound),
         ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
-        ``NAME_samples`` (counted) and ``NAME_worst_sample``; ``outcome_...`` along ``kind``;
-        verdicts along ``requirement``; what matters along ``input`` and ``output``, see
-        ``influence`` and ``sensitivity``; the worst samples along ``worst``.  NaN
-        stands for what the samples do not tell; ``intervals`` among the attributes says what
-        intervals are from, or why there are none.
+        ``NAME_samples`` (counted) and ``NAME_worst_sample``; ``NAME_end_sample`` (bound) with the
+        least and the largest value, and ``NAME_end_error``, what these state as their numerical
+        error; ``NAME_error_samples``, ``NAME_largest_error`` and its sample along ``source``;
+        ``balance_...``, errors of the solution; ``outcome_...`` along ``kind``; verdicts along
+        ``requirement``; what matters along ``input`` and ``output``, see ``influence`` and
+        ``sensitivity``; the worst samples along ``worst``.  NaN stands for what the samples do not
+        tell; ``intervals`` among the attributes says what intervals are from, or why there are
+        none.
 
     InputError if it is no campaign, or a requirement cannot be judged by it.
     """
@@ -107,6 +119,7 @@ def analyse(
         },
         attrs={
             "title": campaign.attrs.get("title", ""),
+            "campaign_name": campaign.attrs.get("campaign_name", ""),
             "campaign_identity": campaign.attrs.get("identity", ""),
             "samples": campaign.sizes["sample"], "samples_run": int(ran(campaign).sum()),
             "design": placed.kind, "intervals": placed.told,
@@ -118,10 +131,7 @@ def analyse(
         "units": "1",
     }
     stand = population_of(campaign)
-    for name in quantities():
-        if name in stand and np.isfinite(numbers(stand, name)[good(stand)]).any():
-            found = found.assign(_output(stand, name, placed))
-    found = found.assign(tail(campaign))
+    found = found.assign(statistics(stand, placed)).assign(tail(campaign)).assign(balance(campaign))
     more = [outcomes(stand, placed), influence(stand, wanted, placed)]
     more += [worst(stand, wanted)]
     more += [judge(stand, wanted, placed)] if wanted else []
@@ -150,6 +160,7 @@ def _bent(found: xr.Dataset) -> list[str]:
         "group",
         "index_used",
         "index_lost",
+        "balance",
     )
     safe = ("_samples", "_lower", "_upper", "_required", "_bounds", "_verdict", "_text", "_units")
     return [
@@ -157,6 +168,17 @@ def _bent(found: xr.Dataset) -> list[str]:
         if not str(name).startswith(of_all) and not str(name).endswith(safe)
         and each.dtype.kind == "f"
     ]  # fmt: skip
+
+
+def statistics(
+    campaign: xr.Dataset, placed: Placement, names: Collection[str] | None = None
+) -> dict[str, Any]:
+    """All variables about outputs (by default all that have a value), see ``analyse``."""
+    found = dict[str, Any]()
+    for name in quantities() if names is None else names:
+        if name in campaign and np.isfinite(numbers(campaign, name)[good(campaign)]).any():
+            found |= _output(campaign, name, placed)
+    return found
 
 
 def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any]:
@@ -174,7 +196,9 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
     def told(words: str) -> dict[str, str]:
         return units | {"long_name": f"{words} of: {about}"}
 
-    errors = _errors(campaign, name, known, index, placed)
+    errors = _errors(campaign, name, known, placed)
+    ends = [np.argmin(used), np.argmax(used)]
+    bars = numbers(campaign, f"{name}_error")[known][ends]
     return {
         name: ("statistic", estimates(used, placed), told("estimates")),
         f"{name}_interval": (
@@ -188,7 +212,21 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
             "counted", np.array([*counts, len(values) - sum(counts)], dtype="i8"),
             told("samples") | {"units": "1"},
         ),
-        f"{name}_error_of_mean": ("source", errors, told("error of the mean by its source")),
+        f"{name}_end_sample": (
+            "bound", index[ends], told("samples with the least and the largest value")
+            | {"units": "1"},
+        ),
+        f"{name}_end_error": ("bound", bars, told("numerical error that these state")),
+        f"{name}_error_of_mean": (
+            "source", errors[:, 0], told("error of the mean by its source"),
+        ),
+        f"{name}_error_samples": (
+            "source", errors[:, 1].astype("i8"), told("samples that tell it") | {"units": "1"},
+        ),
+        f"{name}_largest_error": ("source", errors[:, 2], told("largest error of a sample")),
+        f"{name}_largest_error_sample": (
+            "source", errors[:, 3].astype("i8"), told("sample with that error") | {"units": "1"},
+        ),
         f"{name}_worst_sample": (
             (), worst_sample(campaign, quantities()[name]),
             told("sample with the worst value; -1 where neither end is the worse one")
@@ -238,27 +276,58 @@ def interval_of(values: Array, samples: NDArray[np.int64], placed: Placement) ->
 
 
 def _errors(
-    campaign: xr.Dataset, name: str, known: NDArray[np.bool_], index: NDArray[np.int64],
-    placed: Placement,
+    campaign: xr.Dataset, name: str, known: NDArray[np.bool_], placed: Placement
 ) -> Array:  # fmt: skip
-    """Standard error of the mean, error bars and difference of engines, shape (source,).
+    """Standard error of the mean, error bars and difference of engines, shape (source, 4): the
+    error, the samples that tell it, the largest one (NaN of the mean) and its sample (-1).
 
     The latter two as root mean squares over the samples that have them: those of neighbouring
     samples are alike, so that they do not average out.
     """
-    values = numbers(campaign, name)
-    sampling = placed.error_of_mean(values[known], index)
-    bars = numbers(campaign, f"{name}_error")[known]
-    apart = np.full(0, np.nan)
+    values, index = numbers(campaign, name), campaign["sample"].to_numpy()
+    sampling = placed.error_of_mean(values[known], index[known])
+    apart = np.full(len(values), np.nan)
     if f"status{CHECKED}" in campaign and f"{name}{CHECKED}" in campaign:
-        both = known & (campaign[f"status{CHECKED}"].to_numpy() == Status.OK)
-        apart = (values - numbers(campaign, f"{name}{CHECKED}"))[both]
-    return np.array([sampling, _root_mean_square(bars), _root_mean_square(apart)])
+        both = campaign[f"status{CHECKED}"].to_numpy() == Status.OK
+        apart = np.where(both, np.abs(values - numbers(campaign, f"{name}{CHECKED}")), np.nan)
+    return np.array([
+        (sampling, known.sum(), np.nan, -1),
+        *(root_mean_square(np.where(known, each, np.nan), index)
+          for each in (numbers(campaign, f"{name}_error"), apart)),
+    ])  # fmt: skip
 
 
-def _root_mean_square(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+def root_mean_square(values: Array, samples: NDArray[np.int64]) -> tuple[float, float, float, int]:
+    """Of the finite values: root mean square, their number, the largest and its sample."""
+    known = np.isfinite(values)
+    if not known.any():
+        return np.nan, 0, np.nan, -1
+    largest = int(np.argmax(np.where(known, values, -np.inf)))
+    mean = float(np.sqrt(np.mean(values[known] ** 2)))
+    return mean, int(known.sum()), float(values[largest]), int(samples[largest])
+
+
+def balance(campaign: xr.Dataset) -> dict[str, Any]:
+    """Errors of the solution itself along ``balance``: ``balance_median`` and ``balance_largest``
+    over the samples whose numbers hold, the sample with the largest, and how many tell it.
+    """
+    rows, names, samples = list[tuple[float, ...]](), list[str](), campaign["sample"].to_numpy()
+    for name in NUMERICAL:
+        values = np.where(good(campaign), numbers(campaign, name), np.nan)
+        _, count, largest, sample = root_mean_square(values, samples)
+        if count:
+            names.append(str(campaign[name].attrs.get("long_name", name)))
+            rows.append((float(np.nanmedian(values)), largest, sample, count))
+    columns = np.array(rows).reshape(-1, 4).T
+    words = ("median", "largest", "sample", "samples")
+    found: dict[str, Any] = {
+        f"balance_{word}": (
+            "balance", each if word in words[:2] else each.astype("i8"),
+            {"long_name": f"{word} of the errors of balance", "units": "1"},
+        )
+        for word, each in zip(words, columns, strict=True)
+    }  # fmt: skip
+    return found | {"balance": np.array(names, dtype=object)} if names else {}
 
 
 def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
@@ -268,17 +337,11 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
     each outcome (``outcome_lost``), and its interval reaches from none of them to all.
     """
     ok, gone, index = good(campaign), lost(campaign), campaign["sample"].to_numpy()
-    fates = campaign[OUTCOME].to_numpy() if OUTCOME in campaign else np.full(len(ok), Fate.NONE)
-    status = campaign["status"].to_numpy()
-    of = ok | gone
-    rows: dict[str, tuple[NDArray[np.bool_], NDArray[np.bool_]]] = {}
-    for fate in Fate:
-        word = fate.word if fate != Fate.NONE else "unknown"
-        own = ok & (np.maximum(fates, 0) == fate)
-        rows[word] = own, own | gone
-    for code in Status:
-        rows[f"{LOST}: {code.word}"] = (own := gone & (status == code)), own
-    rows = {word: (own, most) for word, (own, most) in rows.items() if own.any()}
+    of, words = ok | gone, endings(campaign)
+    rows = {
+        word: (own, own if word.startswith(LOST) else own | gone)
+        for word in kinds_of_ends(words) for own in [words == word]
+    }  # fmt: skip
     shares = np.full((len(rows), len(PARTS)), np.nan)
     ends, run = np.full((len(rows), 2), np.nan), np.flatnonzero(ran(campaign))
     for k, (own, most) in enumerate(rows.values()):
@@ -346,7 +409,6 @@ CHOICES = (*GROUPS, *OUTPUTS, "energy")
 class Setting(Model):
     """An engine and one setting by scene path, with measured errors and cost."""
 
-    model_config = ConfigDict(extra="ignore")  # files of earlier versions hold more
     seconds: float
     """Processor time of a run, s."""
     fidelity: Literal["full", "frame"] = "full"
@@ -361,7 +423,6 @@ class Evidence(Model):
     The scene's own setting comes before others that are hardly cheaper.
     """
 
-    model_config = ConfigDict(extra="ignore")
     scene: str
     kind: dict[str, Any]
     """See :func:`kind_of_scene`."""

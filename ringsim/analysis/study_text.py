@@ -1,15 +1,22 @@
-"""An analysis of a campaign as lines for people."""
+"""What an analysis of a campaign tells, as tables: one for terminals, pages and Python alike."""
 
 import json
-from collections.abc import Collection, Iterator
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.brief import digits_of, output_table, what_matters, what_separates
 from ringsim.analysis.design import placement, population_of
-from ringsim.analysis.influence_text import influence_tables, refusals, sensitivity_tables
-from ringsim.analysis.intervals import quantities
+from ringsim.analysis.influence_text import (
+    influence_tables,
+    refusals,
+    sensitivity_tables,
+    what_matters,
+    what_separates,
+)
+from ringsim.analysis.intervals import LEAST_OF_BOOTSTRAP, numbers, quantities, ranks
+from ringsim.analysis.requirements import OUTCOME, read_requirements
 from ringsim.analysis.reweighting import (
     LEAST_OF_MEAN,
     LEAST_OF_SHARE,
@@ -17,13 +24,20 @@ from ringsim.analysis.reweighting import (
     REWEIGHTED_STATISTICS,
     SOBOL,
 )
-from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
-from ringsim.analysis.tails import tail, tail_lines
-from ringsim.analysis.verdicts import OUTCOME, Verdict, judge, read_requirements, stopping_lines
-from ringsim.analysis.worst import LOST, MARK, NOTE, losses, marked, worst_lines
+from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
+from ringsim.analysis.tails import tail, tail_table
+from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
+from ringsim.analysis.worst import (
+    MARK,
+    NOTE,
+    losses,
+    marked,
+    worst_lines,
+    worst_tables,
+)
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import label_of
-from ringsim.tables import Table, counted, interval_text, number_text, slim, text_table
+from ringsim.tables import Table, counted, interval_text, number_text, slim
 
 # Estimates for other distributions of inputs, as lines for people.
 
@@ -32,24 +46,23 @@ THIN = " (few)"
 """Stands behind what too few samples decide."""
 
 
-def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
+def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
     """Which distributions, how many effective samples, then the estimates beside the old ones."""
     if "reweighted_to" not in analysis:
-        return
+        return []
     bent = MARK * bool(analysis.attrs.get(NOTE))
     laws = json.loads(analysis["reweighted_to"].item())
-    told = ", ".join(f"{path} = {label_of(law)}" for path, law in laws.items())
-    yield (
-        f"reweighted to {told}: {analysis['reweighted_samples'].item()} samples count as "
+    law_words = ", ".join(f"{path} = {label_of(law)}" for path, law in laws.items())
+    first = Table((), (), [
+        f"reweighted to {law_words}: {analysis['reweighted_samples'].item()} samples count as "
         f"{number_text(analysis['effective_samples'].item(), 3)} effective ones"
-    )
-    rows, thin = [], False
+    ])  # fmt: skip
+    rows, shares, thin = [], [], False
     for name, variable in quantities().items():
         if f"{name}_reweighted" not in analysis:
             continue
         for statistic in REWEIGHTED_STATISTICS:
             one = analysis.sel(reweighted_statistic=statistic, statistic=statistic)
-            low, high = one[f"{name}_reweighted_interval"].values.tolist()
             decisive = one[f"{name}_decisive_samples"].item()
             few = decisive < (LEAST_OF_MEAN if statistic == "mean" else LEAST_OF_SHARE)
             thin |= few
@@ -57,42 +70,36 @@ def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
                 f"{name}{THIN * few}{bent}", "" if variable.units == "1" else variable.units,
                 statistic.replace("_", " "),
                 number_text(one[name].item()), number_text(one[f"{name}_reweighted"].item()),
-                interval_text(low, high), number_text(one[f"{name}_effective_samples"].item(), 3),
-                number_text(decisive, 3),
+                interval_text(*one[f"{name}_reweighted_interval"].values.tolist()),
+                number_text(one[f"{name}_effective_samples"].item(), 3), number_text(decisive, 3),
             ))  # fmt: skip
-    if rows:
-        head = ("output", "unit", "statistic", "as drawn", "reweighted", "95 % interval",
-                "effective samples", "that decide it")  # fmt: skip
-        yield from text_table(head, rows)
-    shares = []
     for event in analysis["event"].values:
         one = analysis.sel(event=event)
         decisive = one["reweighted_share_decisive"].item()
         few = decisive < LEAST_OF_SHARE
         thin |= few
         shares.append((
-            f"{event}{THIN * few}{'' if event == LOST else bent}",
+            f"{event}{THIN * few}{'' if event == 'lost' else bent}",
             number_text(one["reweighted_share"].item()),
             interval_text(*one["reweighted_share_interval"].values.tolist()),
             number_text(decisive, 3),
         ))  # fmt: skip
-    known = bool(analysis["reweighted_share_interval"].notnull().any())
-    if shares:
-        yield ""
-        if analysis.attrs["design"] in SOBOL and not known:
-            yield f"intervals of shares and quantiles need design.replicates = {LEAST_REPLICATES}"
-        yield from text_table(
-            ("probability of", "reweighted", "95 % interval", "samples that decide it"), shares
+    notes = list[str]()
+    if analysis.attrs["design"] in SOBOL and analysis["reweighted_share_interval"].isnull().all():
+        notes.append(
+            f"intervals of shares and quantiles need design.replicates = {LEAST_REPLICATES}"
         )
     if thin:
-        yield (
+        notes.append(
             f"{THIN.strip()}: too few samples decide it (below {LEAST_OF_MEAN:g} effective of a "
             f"mean, {LEAST_OF_SHARE:g} of others): the estimate may be far off, the interval of "
             "a mean is too short, a quantile has none, and that of a probability holds in any case"
         )
-    if "reweighted_verdict" in analysis:
-        yield ""
-        yield from slim(_verdicts(analysis)).lines()
+    head = ("output", "unit", "statistic", "as drawn", "reweighted", "95 % interval",
+            "effective samples", "that decide it")  # fmt: skip
+    of_shares = ("probability of", "reweighted", "95 % interval", "samples that decide it")
+    found = [first, Table(head, rows), Table(of_shares, shares, notes)]
+    return [*found, _verdicts(analysis)] if "reweighted_verdict" in analysis else found
 
 
 def _verdicts(analysis: xr.Dataset) -> Table:
@@ -120,13 +127,66 @@ _HINT = (
 )
 
 
+class Section(NamedTuple):
+    """A part of what an analysis tells, the same for terminals, pages and Python."""
+
+    name: str
+    title: str
+    tables: Sequence[Table]
+    more: Sequence[Table] = ()
+    """What tells it at length, with every interval and measure."""
+
+
+def sections(analysis: xr.Dataset, folder: str = "DIR") -> dict[str, Section]:
+    """All that an analysis tells, by name, parts without rows and notes left out.
+
+    ``folder`` is the campaign's, for the commands that run samples again.
+    """
+    short = [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
+    every = [*sensitivity_tables(analysis), *influence_tables(analysis)]
+    found = (
+        Section("tail", "Rare event", [tail_table(analysis)]),
+        Section("outcomes", "Outcomes", [outcome_table(analysis)]),
+        Section("statistics", "Numbers", [statistics_table(analysis)], [every_statistic(analysis)]),
+        Section(
+            "errors",
+            "What makes the numbers wrong",
+            error_tables(analysis),
+            error_tables(analysis, every=True),
+        ),
+        Section("matters", "What matters", short, every),
+        Section("worst", "The worst samples", worst_tables(analysis, folder)),
+        Section("requirements", "Requirements", [verdict_table(analysis)]),
+        Section("reweighting", "Other distributions", reweighting_tables(analysis)),
+    )
+    return {
+        each.name: each._replace(tables=tables, more=[m for m in each.more if m.rows or m.notes])
+        for each in found
+        if (tables := [slim(t) for t in each.tables if t.rows or t.notes])
+    }
+
+
 def told(analysis: xr.Dataset, folder: str = "DIR", *, full: bool = False) -> list[str]:
-    """Outcomes, outputs, errors, what matters, the worst samples; verdicts last, where they are
-    seen.  ``folder`` is the campaign's, for the commands that run samples again.
+    """All ``sections`` as lines of a terminal, verdicts near the end, where they are seen.
 
     ``full`` has the interval and the convergence of every statistic, and every measure of what
     matters, whatever chance would explain.
     """
+    lines = [*head_lines(analysis)]
+    if not full:
+        lines.append("all statistics with intervals and convergence, and all inputs: --full")
+    for each in sections(analysis, folder).values():
+        chosen = each.more if full and each.more else each.tables
+        parts = [table.lines() for table in chosen]
+        if each.name == "worst":
+            parts = [worst_lines(analysis, folder)]
+        for part in parts:
+            lines += ["", *part]
+    return lines
+
+
+def head_lines(analysis: xr.Dataset) -> list[str]:
+    """What was analysed, lost runs that bend it, and what its intervals are from."""
     counts = counted(analysis.attrs["samples"], "sample")
     if (run := analysis.attrs["samples_run"]) < analysis.attrs["samples"]:
         counts += f", of which {run} have run"
@@ -139,31 +199,9 @@ def told(analysis: xr.Dataset, folder: str = "DIR", *, full: bool = False) -> li
             "no input is told to matter: samples of a chain repeat each other, and levels lie "
             "beyond different thresholds"
         )
-    if not full:
-        lines.append("all statistics with intervals and convergence, and all inputs: --full")
     if stopping := analysis.attrs["stopping"]:
         lines.append(stopping + MARK * bool(analysis.attrs[NOTE]))
-    lines += tail_lines(analysis)
-    tables = [outcome_table(analysis)]
-    if full:
-        tables += [_outputs(analysis), error_table(analysis)]
-        tables += [*sensitivity_tables(analysis), *influence_tables(analysis)]
-    else:
-        tables += [output_table(analysis, outputs_in(analysis)), _known_errors(analysis)]
-        tables += [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
-    parts = [table.lines() if full else slim(table).lines() for table in tables]
-    parts += [worst_lines(analysis, folder)]
-    parts += [slim(verdict_table(analysis)).lines(), list(reweighting_lines(analysis))]
-    for more in filter(None, parts):
-        lines += ["", *more]
     return lines
-
-
-def _known_errors(analysis: xr.Dataset) -> Table:
-    """The errors, if there is another one than that of sampling."""
-    names = outputs_in(analysis)
-    known = [np.isfinite(analysis[f"{name}_error_of_mean"].values[1:]).any() for name in names]
-    return error_table(analysis) if any(known) else Table((), ())
 
 
 def verdict_lines(campaign: xr.Dataset) -> list[str]:
@@ -172,7 +210,8 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
     placed, lost = placement(campaign), losses(campaign)
     found = xr.Dataset(tail(campaign), attrs={"samples": campaign.sizes["sample"]})
     lines = [*filter(None, [lost.note])]
-    lines += [line + lost.mark for line in stopping_lines(campaign, placed)] + tail_lines(found)
+    lines += [line + lost.mark for line in stopping_lines(campaign, placed)]
+    lines += tail_table(found).lines()
     if not own:
         return lines
     try:
@@ -235,7 +274,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
     """What the antenna did, and how runs were lost, with shares."""
     rows = [
         (
-            str(kind).replace("_", " "),
+            str(kind),
             f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}"
             + f" ({one['outcome_lost'].item()} lost)" * bool(one["outcome_lost"].item()),
             number_text(one["outcome_share"].item()),
@@ -252,12 +291,60 @@ def _parts() -> list[str]:
     return [f"first {part:.0%}" for part in PARTS[:-1]]
 
 
-def _outputs(analysis: xr.Dataset) -> Table:
+def statistics_table(analysis: xr.Dataset) -> Table:
+    """Mean with its interval, scatter, quantiles and range of each output, and its worst sample."""
+    rows, few = [], False
+    for name in outputs_in(analysis):
+        values, counts = analysis[name].values, analysis[f"{name}_samples"].values
+        mean, deviation, *quantiles, least, most = values
+        used, run = counts[0], counts[:3].sum()  # what has not run is the last
+        count = str(used) if used == run else f"{used} of {run}"
+        units = analysis[name].attrs["units"]
+        units = "" if units == "1" else units
+        if least == most:
+            rows.append((name, units, number_text(least), "all alike", *"------", "-", count))
+        elif np.isfinite(least):
+            fine = digits_of(least, most)
+            low, high = analysis[f"{name}_interval"].values[0].tolist()
+            scatters = np.isfinite(analysis[f"{name}_error_of_mean"].values[0])
+            few |= bool(scatters and np.isnan(low) and used < LEAST_OF_BOOTSTRAP)
+            others = [number_text(v, fine) for v in (*quantiles, least, most)]
+            worst = int(analysis[f"{name}_worst_sample"])
+            rows.append((
+                name, units, number_text(mean, fine), interval_text(low, high, fine),
+                number_text(deviation), *others, "-" if worst < 0 else str(worst), count,
+            ))  # fmt: skip
+    head = (
+        "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
+        "most", "worst sample", "used",
+    )  # fmt: skip
+    return marked(Table(head, rows, [too_few()] * few), analysis)
+
+
+def too_few() -> str:
+    """How many samples intervals take."""
+    of_median, of_others = (
+        next(n for n in range(2, 1000) if ranks(n, level)) for level in (0.5, 0.05)
+    )
+    return (
+        f"no interval of what fewer than {LEAST_OF_BOOTSTRAP} samples tell: that of a mean or a "
+        f"standard deviation takes {LEAST_OF_BOOTSTRAP}, of a median {of_median}, of the other "
+        f"quantiles {of_others}"
+    )
+
+
+def digits_of(least: float, most: float) -> int:
+    """So many digits that a range has four of its own."""
+    larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
+    return max(4, int(np.log10(larger)) + 4)
+
+
+def every_statistic(analysis: xr.Dataset) -> Table:
+    """A row a statistic of each output, with its interval, its convergence, and whose it is."""
     rows = []
     for name in outputs_in(analysis):
         used, lost, absent, _ = (str(n) for n in analysis[f"{name}_samples"].values)
-        units = analysis[name].attrs["units"]
-        values = analysis[name].values
+        units, values = analysis[name].attrs["units"], analysis[name].values
         least, most = values[-2:]
         fine = digits_of(least, most)
         for k, statistic in enumerate(STATISTICS):
@@ -266,17 +353,21 @@ def _outputs(analysis: xr.Dataset) -> Table:
             if np.isnan(value) or (least == most and statistic != "maximum"):
                 continue
             digits = 4 if statistic == "standard_deviation" else fine
-            low, high = analysis[f"{name}_interval"].values[k]
             first = analysis[f"{name}_convergence"].values[:-1, k]
+            low, high = analysis[f"{name}_interval"].values[k].tolist()
+            side, who = k - len(STATISTICS) + 2, ("-", "-")
+            if side >= 0 and least < most:
+                bar = analysis[f"{name}_end_error"].values[side]
+                who = str(analysis[f"{name}_end_sample"].values[side]), number_text(bar, 2)
             rows.append((
                 name, "" if units == "1" else units,
                 "all" if least == most else statistic.replace("_", " "), number_text(value, digits),
-                interval_text(low, high, digits), *(number_text(v, digits) for v in first),
-                used, lost, absent,
+                interval_text(low, high, digits), *who,
+                *(number_text(v, digits) for v in first), used, lost, absent,
             ))  # fmt: skip
     head = (
-        "output", "unit", "statistic", "estimate", "95 % interval", *_parts(), "used", "lost",
-        "no value",
+        "output", "unit", "statistic", "estimate", "95 % interval", "in sample",
+        "its error bar", *_parts(), "used", "lost", "no value",
     )  # fmt: skip
     return marked(Table(head, rows), analysis)
 
@@ -286,26 +377,46 @@ def outputs_in(analysis: xr.Dataset) -> list[str]:
     return [name for name in quantities() if name in analysis]
 
 
-def error_table(analysis: xr.Dataset, names: Collection[str] | None = None) -> Table:
-    """What makes means wrong, and by how much; ``names`` are the outputs, by default all."""
+def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
+    """The error budget: what makes means wrong, by how much and where it is largest, as far as
+    there is more than the error of sampling (or ``every`` one); then errors of the solution itself.
+    """
     rows = []
-    for name in outputs_in(analysis) if names is None else names:
-        errors = analysis[f"{name}_error_of_mean"].values
+    for name in outputs_in(analysis):
+        errors, counts, largest, samples = (
+            analysis[f"{name}_{word}"].values
+            for word in ("error_of_mean", "error_samples", "largest_error", "largest_error_sample")
+        )
         mean, *_, least, most = analysis[name].values
-        if np.isfinite(errors).any() and np.isfinite(mean) and least < most:
-            rows.append(
-                (
-                    name,
-                    analysis[name].attrs["units"],
-                    *(number_text(e, 2) for e in errors),
-                    dominating(errors),
-                )
-            )
+        known = np.isfinite(errors)
+        if not (known.any() and np.isfinite(mean) and least < most):
+            continue
+        every |= bool(known[1:].any())
+        cells = [number_text(errors[0], 2)]
+        for error, count, most_of_all, sample in list(
+            zip(errors, counts, largest, samples, strict=True)
+        )[1:]:
+            told = [number_text(error, 2), str(count), f"{most_of_all:.2g} (sample {sample})"]
+            cells += told if count else ["-"] * 3
+        rows.append((name, analysis[name].attrs["units"], *cells, dominating(errors)))
     head = (
         "error of the mean of", "unit", "sampling (standard error)", "numerical (error bars)",
-        "engines (difference)", "dominates",
+        "samples with bars", "largest bar", "engines (difference)", "samples checked",
+        "largest difference", "dominates",
     )  # fmt: skip
-    return marked(Table(head, rows), analysis)
+    tables = [marked(Table(head, rows), analysis)] if every else []
+    if "balance" in analysis.dims:
+        columns = (analysis[f"balance_{word}"].values.tolist()
+                   for word in ("median", "largest", "sample", "samples"))  # fmt: skip
+        balances = [
+            (str(name), f"{median:.2g}", f"{largest:.2g} (sample {sample})", str(count))
+            for name, median, largest, sample, count in zip(
+                analysis["balance"].values, *columns, strict=True
+            )
+        ]
+        of_solution = "error of the solution", "median", "largest", "samples"
+        tables.append(marked(Table(of_solution, balances), analysis))
+    return tables
 
 
 def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
@@ -316,3 +427,14 @@ def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
     unknown = [name for name, k in zip(SOURCES, known, strict=True) if not k]
     found = SOURCES[int(np.nanargmax(errors))]
     return f"{found} ({', '.join(unknown)} unknown)" if unknown else found
+
+
+def error_lines(campaign: xr.Dataset) -> list[str]:
+    """Statistics and errors of those outputs of a merged campaign that have error bars."""
+    stand = population_of(campaign)
+    barred = [n for n in quantities() if np.isfinite(numbers(stand, f"{n}_error")).any()]
+    found = xr.Dataset(
+        statistics(stand, placement(campaign), barred), attrs={NOTE: losses(campaign).note}
+    )
+    tables = [statistics_table(found), *error_tables(found)]
+    return [line for table in tables if table.rows for line in slim(table).lines()]

@@ -19,6 +19,7 @@ from ringsim.analysis.intervals import (
 from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.subset_levels import Repetition
 from ringsim.stepping.instant import Array
+from ringsim.tables import Table
 from ringsim.variables import Status
 
 DISAGREE = 0.01
@@ -286,45 +287,58 @@ def unseen_lines(found: xr.Dataset) -> list[str]:
     return lines
 
 
-def tail_lines(analysis: xr.Dataset) -> list[str]:
-    """The same as sentences; none without it."""
+def tail_table(analysis: xr.Dataset) -> Table:
+    """Probability of the rare event with its interval, how sure it is and why; empty without one.
+
+    ``analysis`` holds what ``tail`` gives, and the number of ``samples`` among its attributes.
+    """
     if "tail_probability" not in analysis:
-        return []
-    one = {str(n): v.to_numpy() for n, v in analysis.items() if str(n).startswith("tail_")}
-    event = analysis["tail_probability"].attrs["event"]
-    if not one["tail_ended"]:
-        return [f"probability of {event}: not all levels have run"]
-    runs = f"{analysis.attrs['samples']} runs, {int(one['tail_lost'])} lost and taken as no event"
-    count, probability = len(one["tail_levels"]), float(one["tail_probability"])
-    low, high = one["tail_probability_interval"]
-    if np.isnan(low):
-        return [f"probability of {event}: {'; '.join([*short_of(analysis), runs])}"]
-    by_chains = f"{float(one['tail_variation_of_chains']):.2g} from the correlation of chains"
-    variation = f"{float(one['tail_variation']):.2g} from {count} replicates, " if count > 1 else ""
-    lines = [
-        f"probability of {event}: {probability:.3g} (95 % {low:.2g} .. {high:.2g}, of the parts "
-        f"of it that chains found), coefficient of variation {variation}{by_chains}; "
-        f"{one['tail_levels'].max()} levels at most, {runs}",
-        *unseen_lines(analysis),
+        return Table((), ())
+    head = "rare event", str(analysis["tail_probability"].attrs["event"])
+    runs, lost = analysis.attrs["samples"], int(analysis["tail_lost"])
+    replicates, levels = analysis.sizes["tail_replicate"], int(analysis["tail_levels"].max())
+    if not int(analysis["tail_ended"]):
+        notes = ["not all levels have run: there is no probability yet"]
+        return Table(head, [("runs so far", str(runs))], notes)
+    low, high = analysis["tail_probability_interval"].to_numpy()
+    by_chains = f"{float(analysis['tail_variation_of_chains']):.2g} by the chains alone"
+    scatter = f"{float(analysis['tail_variation']):.2g} by the replicates, " * (replicates > 1)
+    if why := short_of(analysis):
+        rows = [("probability", why[0])]
+    else:
+        each = (f"{p:.2g}" for p in analysis["tail_replicate_probability"].to_numpy())
+        rows = [
+            ("probability", f"{float(analysis['tail_probability']):.3g}"),
+            ("95 % interval, of the parts that chains found", f"{low:.2g} .. {high:.2g}"),
+            ("coefficient of variation", f"{scatter}{by_chains}"),
+            ("by each replicate", ", ".join(each)),
+        ]
+    rows += [
+        ("levels", f"{levels} at most, in {replicates} replicates"),
+        ("runs", f"{runs}, {lost} lost and taken as no event"),
     ]
-    if checked := int(one["tail_checked"]):
-        confirmed = int(one["tail_confirmed"])
+    if checked := int(analysis["tail_checked"]):
+        confirmed = int(analysis["tail_confirmed"])
         low, high = share_interval(confirmed, checked)
-        lines.append(
-            f"{confirmed} of {checked} runs in the event that were repeated with the full engine "
-            f"are in it there, too (95 % {low:.2g} .. {high:.2g} of all)"
-        )
-    if outside := int(one["tail_checked_outside"]):
-        lines.append(
-            f"{int(one['tail_missed'])} of {outside} repeated runs outside it, the nearest ones "
-            "and those that fell short of their goal, are in it by the full engine"
-        )
-    if checked or outside:
-        farther, nearer = one["tail_probability_moved"]
-        units = analysis["tail_difference"].attrs["units"]
-        lines.append(
-            f"with the limit moved by the largest difference of the engines, "
-            f"{float(one['tail_difference']):.2g} {units}, the probability is {farther:.3g} to "
-            f"{nearer:.3g}"
-        )
-    return lines
+        rows.append((
+            "in the event by the full engine, too",
+            f"{confirmed} of {checked} repeated runs (95 %: {low:.2g} .. {high:.2g} of all)",
+        ))  # fmt: skip
+    if outside := int(analysis["tail_checked_outside"]):
+        rows.append((
+            "in the event by the full engine alone",
+            f"{int(analysis['tail_missed'])} of the {outside} nearest runs outside it, and of "
+            "those that fell short of their goal",
+        ))  # fmt: skip
+    if (checked or outside) and not why:
+        apart = analysis["tail_difference"]
+        farther, nearer = analysis["tail_probability_moved"].to_numpy()
+        rows.append((
+            f"probability with the limit moved by {float(apart):.2g} {apart.attrs['units']}, what "
+            "the engines differ by",
+            f"{farther:.3g} to {nearer:.3g}",
+        ))  # fmt: skip
+    notes = why[1:] or unseen_lines(analysis)
+    if why:
+        notes.append("raise samples or most_levels, so that every replicate reaches the event")
+    return Table(head, rows, notes, left=2)

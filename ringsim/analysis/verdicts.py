@@ -2,15 +2,14 @@
 
 import json
 import math
-import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from itertools import takewhile
 from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field, model_validator
 from scipy.stats import t
 
 from ringsim.analysis import intervals
@@ -25,129 +24,14 @@ from ringsim.analysis.intervals import (
     samples_needed,
     share_bounds,
     standard_error,
-    tells_of,
 )
+from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
-from ringsim.refusal import InputError, explain, known_or_nearest, show
+from ringsim.refusal import known_or_nearest
 from ringsim.tables import counted, number_text
 from ringsim.units import Model
 from ringsim.variables import GOALS, Code, Fate, flags_of
-
-# Requirements of a campaign: which values an antenna must keep to, how probably, how surely.
-
-
-OUTCOME = "outcome"
-_WORDS = [fate.word for fate in Fate if fate != Fate.NONE]
-
-
-class Requirement(Model):
-    """What one output must be, with which probability, shown with which confidence."""
-
-    max: float | None = None
-    """Largest value allowed, in the output's unit."""
-    min: float | None = None
-    """Smallest value allowed, in the output's unit."""
-    is_: Annotated[str | None, Field(alias="is")] = None
-    """What the antenna must do; of the outcome alone."""
-    probability: Annotated[float, Field(gt=0.0, lt=1.0)]
-    """Share of all antennas, at least, that must keep to it."""
-    confidence: Annotated[float, Field(ge=0.5, lt=1.0)]
-    """Probability, at least, with which an antenna that does not keep to it is found out."""
-
-    def told(self, name: str) -> str:
-        """The requirement in words, with units."""
-        units = quantities()[name].units if name in quantities() else "1"
-        unit = "" if units == "1" else f" {units}"
-        bounds = {"<=": self.max, ">=": self.min, "is": self.is_}
-        given = [
-            f"{sign} {bound}" if isinstance(bound, str) else f"{sign} {bound:g}{unit}"
-            for sign, bound in bounds.items() if bound is not None
-        ]  # fmt: skip
-        return f"{name} {' and '.join(given)}"
-
-
-def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
-    """Refuse outputs that do not exist, and what their requirements cannot hold."""
-    known = [OUTCOME, *quantities()]
-    for name, each in requirements.items():
-        if name not in known:
-            why = f"is no output that can be required ({known_or_nearest(name, known)})"
-            if name in VARIABLES and VARIABLES[name].dims:
-                senses = {"largest": each.max, "least": each.min}
-                asked = [sense for sense, bound in senses.items() if bound is not None]
-                raise ValueError(instead_of(name, *asked))
-            raise ValueError(f"{name} {why}")
-        if name == OUTCOME:
-            if each.is_ not in _WORDS or each.max is not None or each.min is not None:
-                wrong = f"is = {show(each.is_)}" if each.is_ is not None else "is"
-                hint = known_or_nearest(str(each.is_), _WORDS)
-                raise ValueError(
-                    f'{name}.{wrong} must be a word for what the antenna does, as is = "deployed", '
-                    f"without max and min ({hint})"
-                )
-        elif each.is_ is not None:
-            raise ValueError(
-                f"{name}.is = {show(each.is_)}: only the outcome is a word: give max or min"
-            )
-        elif each.max is None and each.min is None:
-            unit = "" if (u := quantities()[name].units) == "1" else f", in {u}"
-            raise ValueError(f"{name} needs a bound: give max or min{unit}")
-        elif each.max is not None and each.min is not None and each.min >= each.max:
-            raise ValueError(f"{name}.min = {each.min:g} must be below max = {each.max:g}")
-    return requirements
-
-
-Requirements = Annotated[dict[str, Requirement], AfterValidator(_check)]
-"""Requirement by name of the output."""
-
-
-class _Holder(Model):
-    requirements: Requirements
-
-
-def to_json(requirements: dict[str, Requirement]) -> str:
-    """The text that files hold."""
-    adapter = TypeAdapter(dict[str, Requirement])
-    return adapter.dump_json(requirements, by_alias=True, exclude_none=True).decode()
-
-
-def read_requirements(table: Mapping[str, Any], source: str) -> dict[str, Requirement]:
-    """Requirements from a plain table; an InputError begins with ``source``."""
-    try:
-        return _Holder.model_validate({"requirements": dict(table)}).requirements
-    except ValidationError as error:
-        raise InputError(explain(error, _Holder, source)) from None
-
-
-def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
-    """Requirements from texts of the command line.
-
-    >>> parse_requirements(["asynchrony_max: max 10, probability 0.99, confidence 0.9"])
-    {'asynchrony_max': Requirement(max=10.0, min=None, is_=None, probability=0.99, confidence=0.9)}
-    """
-    table: dict[str, dict[str, Any]] = {}
-    for text in texts:
-        name, found, rest = re.match(r"\s*(\w*)\s*([:=]?)(.*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
-        parts = [re.fullmatch(r"(\w+)[\s=]+(\S+)", part.strip()) for part in rest.split(",")]
-        if not name or not found or None in parts:
-            raise InputError(
-                f"--require {show(text)}: must read NAME: KEY VALUE, KEY VALUE, ..., for example "
-                '"asynchrony_max: max 10, probability 0.99, confidence 0.9" or "outcome: is '
-                'deployed, probability 0.99, confidence 0.9"'
-            )
-        if name in table:
-            raise InputError(f"--require {name} is given twice: leave out one of the two")
-        table[name] = {part[1]: _value(part[2]) for part in parts if part}
-    return read_requirements(table, "--require")
-
-
-def _value(word: str) -> Any:
-    try:
-        return float(word)
-    except ValueError:
-        return word.strip("\"'")
-
 
 # When a campaign may stop: the conditions, the looks at them, and how looks share an error.
 #
@@ -303,22 +187,6 @@ class Verdict(Code):
     """The design stands for no population: only violations can be counted."""
 
 
-def violations(campaign: xr.Dataset, name: str, wanted: Requirement) -> Mask:
-    """Which samples violate a requirement, of those that have numbers that hold.
-
-    One without a value violates it: an antenna that never deploys has no deployment time.
-    """
-    if name == OUTCOME:
-        codes = campaign[OUTCOME].to_numpy()
-        broken = codes != Fate[str(wanted.is_).upper()]
-    else:
-        values = numbers(campaign, name)
-        low = -np.inf if wanted.min is None else wanted.min
-        high = np.inf if wanted.max is None else wanted.max
-        broken = ~((values >= low) & (values <= high))
-    return np.asarray(good(campaign) & broken)
-
-
 def bounds(
     kept: Mask, samples: NDArray[np.int64], levels: Levels, placed: Placement
 ) -> Interval:  # fmt: skip
@@ -385,23 +253,6 @@ _MEANING = {
     "samples_short": ("samples that keep to it and ended short of their goal", "i8"),
     "further_samples": ("further samples, none violating, that would show it; -1: none", "i8"),
 }  # fmt: skip
-
-
-def require_values(campaign: xr.Dataset, name: str) -> None:
-    """Refuse (InputError) an output that the runs do not compute: it would seem violated."""
-    if name not in campaign:
-        known = [OUTCOME, *(each for each in quantities() if each in campaign)]
-        raise InputError(
-            f"requirement on {name}: the file has no such output ({known_or_nearest(name, known)})"
-        )
-    none = np.flatnonzero(good(campaign) & ~tells_of(campaign, name))
-    if name != OUTCOME and len(none):
-        raise InputError(
-            f"requirement on {name}: {len(none)} samples reached their goal without a value of "
-            f"it, the first is {campaign['sample'].to_numpy()[none[0]]}: their model does not "
-            "compute it, or an older ringsim ran them; require another output, use the full "
-            "fidelity, or run them again"
-        )
 
 
 def _judged(

@@ -9,14 +9,23 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.design import blocks_of, called, drawn, inputs, place_names
+from ringsim.analysis.design import (
+    LOST,
+    blocks_of,
+    called,
+    drawn,
+    endings,
+    inputs,
+    kinds_of_ends,
+    place_names,
+    short_of_goal,
+)
 from ringsim.analysis.indices import UNLIKELY, dependence
-from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, ran
+from ringsim.analysis.intervals import Mask, lost, numbers, quantities, ran
+from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.verdicts import OUTCOME, Requirement, require_values, violations
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted
-from ringsim.variables import GOALS, Fate, Status
 
 # What is unusual in the inputs of a sample, in words.
 
@@ -186,29 +195,20 @@ def _failures(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement]
 ) -> list[_Failure]:  # fmt: skip
     """All failures that happened; those of the same samples as one, with the words of both."""
-    ok, gone = good(campaign), lost(campaign)
     stuck = -numbers(campaign, "locked_joints")
     found = []
     for name, wanted in requirements.items():
         badness, value = stuck, ""
         if name != OUTCOME:
-            values, value = numbers(campaign, name), name
-            low = -np.inf if wanted.min is None else wanted.min
-            high = np.inf if wanted.max is None else wanted.max
-            badness = np.maximum(low - values, values - high)
+            badness, value = wanted.beyond(numbers(campaign, name)), name
         words, own = f"violates {wanted.told(name)}", violations(campaign, name, wanted)
         if not np.isfinite(badness[own]).any():  # why they ended tells more
             badness, value = stuck, ""
         found.append(_Failure(words, own, badness, value))
-    fates = numbers(campaign, OUTCOME)
-    for fate in Fate:
-        if fate not in GOALS and fate != Fate.NONE:
-            words = fate.word.replace("_", " ")
-            found.append(_Failure(words, ok & (fates == fate), stuck, ""))
-    came = -numbers(campaign, "final_time")
-    for code in Status:
-        own = gone & (campaign["status"].to_numpy() == code)
-        found.append(_Failure(f"lost: {code.word.replace('_', ' ')}", own, came, ""))
+    ends, came = endings(campaign), -numbers(campaign, "final_time")
+    found += [_Failure(word, ends == word, stuck, "") for word in short_of_goal(ends)]
+    kinds = [word for word in kinds_of_ends(ends) if word.startswith(LOST)]
+    found += [_Failure(word, ends == word, came, "") for word in kinds]
     kept: dict[tuple[bytes, str], _Failure] = {}
     for each in (each for each in found if each.own.any()):
         key = each.own.tobytes(), each.value
@@ -234,20 +234,18 @@ def command(folder: str, sample: int) -> str:
     return f"ringsim replay {shlex.quote(folder)} {sample}"
 
 
-def worst_tables(analysis: xr.Dataset, folder: str) -> list[tuple[str, Table]]:
-    """Of each failure its words and a table of its worst samples; none of analyses without."""
+def worst_tables(analysis: xr.Dataset, folder: str) -> list[Table]:
+    """Of each failure a table of its worst samples, the worst first."""
     if "worst" not in analysis.dims:
         return []
     found: dict[str, list[tuple[str, ...]]] = {}
-    columns = [analysis[f"worst_{name}"].values.tolist() for name in COLUMNS]
-    for words, failed, of, sample, value, odd in zip(*columns, strict=True):
+    values = [analysis[f"worst_{name}"].values.tolist() for name in COLUMNS]
+    for words, failed, of, sample, value, odd in zip(*values, strict=True):
         head = f"{words} ({failed} of {counted(of, 'sample')})"
         row = (str(sample), value, odd, command(folder, sample))
         found.setdefault(head, []).append(row)
-    return [
-        (head, Table(("sample", "found", "unusual in its inputs", "run it again"), rows, left=4))
-        for head, rows in found.items()
-    ]
+    columns = ("sample", "found", "unusual in its inputs", "run it again")
+    return [Table(columns, rows, left=4, title=words) for words, rows in found.items()]
 
 
 COLUMNS = ("failure", "failed", "of", "sample", "found", "inputs")
@@ -256,8 +254,8 @@ COLUMNS = ("failure", "failed", "of", "sample", "found", "inputs")
 def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
     """The same for terminals."""
     lines = list[str]()
-    for head, table in worst_tables(analysis, folder):
-        lines.append(f"worst of: {head}")
+    for table in worst_tables(analysis, folder):
+        lines.append(f"worst of: {table.title}")
         for sample, value, odd, again in table.rows:
             lines += [f"  sample {sample}: {value}", f"    inputs: {odd}", f"    {again}"]
     return [*lines, NOTE_ON_UNUSUAL] if lines else []
@@ -271,10 +269,10 @@ def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
 
 MARK = " *"
 """Stands behind what lost runs bend."""
+_OF_LOSSES = "lost"
+"""How names of groups and outcomes begin that are those of lost runs: all that ran tell them."""
 NOTE = "lost_runs"
 """Attribute that says why, of an analysis and of each of its variables that is bent."""
-LOST = "lost"
-"""How names of groups and outcomes begin that are those of lost runs: all that ran tell them."""
 
 
 @dataclass(frozen=True)
@@ -325,7 +323,7 @@ def marked(table: Table, analysis: xr.Dataset, column: int = 0) -> Table:
         return table
     rows, own = [], False
     for row in table.rows:
-        own = row[0].startswith(LOST) if row[0] else own  # a blank repeats the one above
+        own = row[0].startswith(_OF_LOSSES) if row[0] else own  # a blank repeats the one above
         mark = "" if own else MARK
         rows.append((*row[:column], f"{row[column]}{mark}", *row[column + 1 :]))
     return table._replace(rows=rows)

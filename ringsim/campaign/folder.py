@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim import build
-from ringsim.analysis.verdicts import to_json
+from ringsim.analysis.requirements import to_json
 from ringsim.campaign.specification import SOLVERS, Campaign, flat
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError, show

@@ -15,7 +15,7 @@ import numpy as np
 import tomli_w
 import xarray as xr
 
-from ringsim.analysis.brief import budget_lines, notes
+from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.engines import check_lines, too_far
 from ringsim.campaign.folder import (
     FAILED,
@@ -216,7 +216,8 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
     """Merge if nothing is left, say how it ended, and choose the exit code."""
     if choices.more and not stop.reason and not len(campaign.survey().missing):
         return EXIT_DONE
-    from ringsim.analysis.study_text import verdict_lines  # scipy.stats takes half a second
+    # scipy.stats takes half a second
+    from ringsim.analysis.study_text import error_lines, verdict_lines
 
     stop.at_once = True
     try:
@@ -233,7 +234,7 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
         with xr.open_dataset(path) as dataset:
             lines = notes(dataset)
             if listed or campaign.scene.solver.error_bars:
-                lines += budget_lines(dataset)
+                lines += error_lines(dataset)
             lines += check_lines(dataset) + verdict_lines(dataset)
             refused = too_far(dataset)
         for line in lines:

@@ -9,7 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from ringsim.analysis.intervals import quantities
-from ringsim.analysis.verdicts import Condition, Looks, Requirements, Rule, as_list
+from ringsim.analysis.requirements import Requirements
+from ringsim.analysis.verdicts import Condition, Looks, Rule, as_list
 from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text

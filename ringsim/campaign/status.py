@@ -5,7 +5,7 @@ import json
 import time
 from collections import Counter
 
-from ringsim.analysis.brief import ending_lines
+from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.campaign.folder import Folder
 from ringsim.campaign.run import growth_told
 from ringsim.campaign.stopping import End, decided, looks_of

@@ -14,7 +14,8 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import placement
-from ringsim.analysis.verdicts import OUTCOME, Rule, read_requirements, rule_of
+from ringsim.analysis.requirements import OUTCOME, read_requirements
+from ringsim.analysis.verdicts import Rule, rule_of
 from ringsim.campaign.folder import Folder
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError

@@ -71,10 +71,10 @@ def campaign_command(
             return
         import xarray as xr
 
-        from ringsim.plots.campaign.figures import draw_campaign
+        from ringsim.plots.figures import draw_figures
 
         found = xr.load_dataset(folder / MERGED, engine="netcdf4")
-        for picture in draw_campaign(found, folder, formats=formats or ("png",)):
+        for picture in draw_figures(found, folder, "campaign", formats or ("png",)):
             click.echo(f"wrote {picture}")
 
     if dry_run:

@@ -7,7 +7,7 @@ from typing import Any
 import click
 import xarray as xr
 
-from ringsim.analysis.brief import notes
+from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.engines import check_lines
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.stopping import as_decided, merge
@@ -92,10 +92,10 @@ def analyse_command(
 
     Exit codes: 0 done, whatever the verdicts; 2 bad input.
     """
+    from ringsim.analysis.requirements import parse_requirements, read_requirements
     from ringsim.analysis.reweighting import parse_reweighted
     from ringsim.analysis.study import analyse
     from ringsim.analysis.study_text import told
-    from ringsim.analysis.verdicts import parse_requirements, read_requirements
     from ringsim.dataset import require_file, save
 
     others = parse_reweighted(reweighted)
@@ -195,8 +195,7 @@ def plot_command(
     if sample is not None and not animate:
         raise InputError(f"--sample {sample}: says nothing without --animate; give both")
     from ringsim.analysis.design import MERGED
-    from ringsim.plots.campaign.figures import draw_campaign
-    from ringsim.plots.run import draw_run
+    from ringsim.plots.figures import draw_figures, left_out
 
     with opened(file) as dataset:
         file = file / MERGED if file.is_dir() else file
@@ -207,10 +206,12 @@ def plot_command(
                 f"{file}: holds neither a run nor a campaign: give a file that ringsim run or "
                 "ringsim campaign has written (campaign.nc)"
             )
-        draw, folder = draw_campaign if campaign else draw_run, out or file.parent
-        drawn = draw(dataset, folder, file.stem, formats or ("png",))
+        folder = out or file.parent
+        drawn = draw_figures(dataset, folder, file.stem, formats or ("png",))
         for picture in drawn:
             click.echo(f"wrote {picture}")
+        if why := left_out(dataset):
+            click.echo(why)
         if not drawn:
             click.echo(f"{file}: nothing to draw: no run got as far as its first record")
         elif animate:

@@ -179,9 +179,9 @@ def run_command(
         click.echo(f"  {line}")
     click.echo(f"{done} {target}")
     if plot:
-        from ringsim.plots.run import draw_run
+        from ringsim.plots.figures import draw_figures
 
-        for picture in draw_run(dataset, target.parent, target.stem, formats or ("png",)):
+        for picture in draw_figures(dataset, target.parent, target.stem, formats or ("png",)):
             click.echo(f"wrote {picture}")
         drawn = chosen.structure.locks and kind_of(chosen.rods) != "ancf"
         # Not recorded for the figure: steps that resolve the rods' vibration are another run.

@@ -18,6 +18,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
 from ringsim.plots import style
 from ringsim.plots.peaks import Peak, peak_of
+from ringsim.plots.registry import jointed, picture
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import Shape, Track, places_at, shape_of
 
@@ -46,7 +47,7 @@ LOOKS: dict[str, dict[str, Any]] = {
 }
 
 
-@style.styled
+@picture("run", 50, "The structure stowed, half-way and deployed", ("opening_angle",), jointed)
 def ring(dataset: xr.Dataset, states: int = 3) -> Figure:
     """Instants of a run side by side, all to one scale, with a scale bar in metre.
 
@@ -245,7 +246,7 @@ _SHOWN = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Shares of the cable's longest length at which the strain is drawn along the beam."""
 
 
-@style.styled
+@picture("run", 90, "Tension along the cables", ("cable_tension", "cable_length"), name="tension")
 def tension_over_length(dataset: xr.Dataset) -> Figure:
     """``cable_tension`` (plane, span, time) over ``cable_length`` (plane, time).
 
@@ -279,7 +280,7 @@ def tension_over_length(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-@style.styled
+@picture("run", 100, "Bending strain", ("bending_strain", "cable_length"), name="bending_strain")
 def strain_over_length(dataset: xr.Dataset) -> Figure:
     """``bending_strain`` (station, time) of the upper beam, as paper 001's fig. 9.
 

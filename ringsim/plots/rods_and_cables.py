@@ -13,10 +13,12 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Cable
+from ringsim.layout.bodies import JointOpening, OnRod
+from ringsim.layout.layout import layout_of
 from ringsim.plots import style
 from ringsim.plots.peaks import mark, peak_of
-from ringsim.scene import scene_from_toml
-from ringsim.structures.pantograph_ring import PantographRing
+from ringsim.plots.registry import jointed, picture
+from ringsim.scene import Scene, scene_from_toml
 
 # Stress in the rods over time.
 
@@ -25,7 +27,7 @@ _COLOURS = (style.INK, "#d00000", style.BLUE, style.GREEN, style.ORANGE, style.P
 _HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
 
 
-@style.styled
+@picture("run", 40, "Stress in the rods over time", ("rod_stress",), jointed)
 def rod_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Figure:
     """``rod_stress`` (rod, section, time), one axes a rod; its halves as in paper 002, figs 11-13.
 
@@ -138,8 +140,7 @@ def section_spans(dataset: xr.Dataset, plane: str) -> SectionSpans:
     has ``cable_tension`` and ``opening_angle``; ``plane`` is one with a cable.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    ring = scene.structure
-    assert isinstance(ring, PantographRing)
+    half_bar, along = _sections(scene, plane)
     cable = getattr(scene.cables, plane)
     backwards = cable.end == "last"
     order = slice(None, None, -1 if backwards else 1)
@@ -151,9 +152,9 @@ def section_spans(dataset: xr.Dataset, plane: str) -> SectionSpans:
     fold = 0.5 * (np.pi - opening)
     aside, inward = cable.bracket.place(fold, cable.block_offset)
     aside = -aside if backwards else aside
-    reach = ring.half_bar * np.cos(fold)
-    lengths = cable.bracket.spans(ring.half_bar, cable.block_offset, opening)[order]
-    directions = ring.geometry().directions[order] * (-1.0 if backwards else 1.0)
+    reach = half_bar * np.cos(fold)
+    lengths = cable.bracket.spans(half_bar, cable.block_offset, opening)[order]
+    directions = along[order] * (-1.0 if backwards else 1.0)
     turned = np.array([
         np.arctan2(np.cross(one, other)[2], one @ other)
         for one, other in pairwise(directions)
@@ -161,9 +162,26 @@ def section_spans(dataset: xr.Dataset, plane: str) -> SectionSpans:
     # Halfway between both sections' directions: behind the one, before the other.
     return SectionSpans(
         cable, pulleys, arriving, entry, behind, np.concatenate([arriving[1:], spans[-1:]]),
-        lengths, (reach + aside, reach - aside), ring.half_bar * np.sin(fold) + inward,
+        lengths, (reach + aside, reach - aside), half_bar * np.sin(fold) + inward,
         (np.append(np.nan, 0.5 * turned), np.append(-0.5 * turned, np.nan)),
     )  # fmt: skip
+
+
+def _sections(scene: Scene, plane: str) -> tuple[float, Array]:
+    """Length of a folding bar's half, m, and directions of the sections, shape (sections, 3), by
+    the layout.
+    """
+    layout, halves, along = layout_of(scene), [], []
+    for opening in layout.openings[scene.structure.planes.index(plane)]:
+        assert isinstance(opening, JointOpening)
+        joint = layout.joints[opening.joint]
+        assert isinstance(joint.first, OnRod)
+        assert isinstance(joint.second, OnRod)
+        rod, other = layout.rods[joint.first.rod], layout.rods[joint.second.rod]
+        chord = other.end.place - rod.start.place
+        halves.append(rod.length)
+        along.append(chord / np.linalg.norm(chord))
+    return float(np.mean(halves)), np.array(along)
 
 
 def pulley_forces(dataset: xr.Dataset, plane: str) -> xr.DataArray:
@@ -241,7 +259,7 @@ def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
     return found
 
 
-@style.styled
+@picture("run", 60, "Spans and tensions of the cables", ("cable_tension", "rope_strain"), jointed)
 def cables(dataset: xr.Dataset) -> Figure:
     """Neutral lengths, elongations, decays and tensions, section by section.
 
@@ -299,7 +317,7 @@ _LINES = ((style.BLUE, "-"), (style.ORANGE, "-"), (style.GREEN, (0, (5, 3))))
 """Both hinge pulleys of a section between others are alike."""
 
 
-@style.styled
+@picture("run", 70, "What the pulleys pass on", ("pulley_ratio", "opening_angle"), jointed)
 def pulleys(dataset: xr.Dataset) -> Figure:
     """``pulley_ratio`` (plane, pulley, time), three curves a section (paper 000, figs 6 and 7).
 
@@ -336,7 +354,7 @@ def pulleys(dataset: xr.Dataset) -> Figure:
 _DRAWN = ("along", "inwards")
 
 
-@style.styled
+@picture("run", 80, "Forces on the pulleys", ("cable_tension", "opening_angle"), jointed)
 def nodal_forces(dataset: xr.Dataset) -> Figure:
     """Components of the force on the pulleys of every section (paper 000, figs 9 and 10).
 
@@ -379,7 +397,7 @@ _SOURCES = (
 )  # fmt: skip
 
 
-@style.styled
+@picture("run", 110, "Drive and resistance", ("drive_margin", "opening_angle"))
 def drive(dataset: xr.Dataset) -> Figure:
     """``drive_available``, ``drive_resistance`` and ``drive_margin`` (time) of a run, and
     ``least_drive_margin``.

@@ -1,9 +1,7 @@
 """Figures of a run: opening angles, asynchrony, energy, the map of its sections."""
 
 import math
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,13 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from ringsim.files import writing
 from ringsim.plots import style
 from ringsim.plots.peaks import label_of, mark, peak_of
-from ringsim.plots.ring import ring, strain_over_length, tension_over_length
-from ringsim.plots.rods_and_cables import cables, drive, nodal_forces, pulleys, rod_stress
-from ringsim.scene import scene_from_toml
-from ringsim.structures.pantograph_ring import PantographRing
+from ringsim.plots.registry import jointed, picture
 
 # Opening angles of all V-joints over time.
 
@@ -29,7 +23,7 @@ LEAST_SPAN = 0.01
 """Smallest range (degree) of the axis of deviations, so that round-off is not magnified."""
 
 
-@style.styled
+@picture("run", 10, "Opening angles over time", ("opening_angle",), jointed)
 def opening_angles(dataset: xr.Dataset) -> Figure:
     """``opening_angle`` (plane, section, time) and, until all have locked, its deviation from the
     mean of all.
@@ -118,7 +112,7 @@ _CLOSE = (0.02, 0.5)
 lines, and more is what the whole run shows as well."""
 
 
-@style.styled
+@picture("run", 20, "Asynchrony over time", ("asynchrony", "opening_angle"))
 def asynchrony(dataset: xr.Dataset) -> Figure:
     """``asynchrony`` (time) of a run up to the deployment: the whole run and its last seconds.
 
@@ -183,7 +177,10 @@ _LOOKS = {
 }
 
 
-@style.styled
+@picture(
+    "run", 120, "Work, energies and their balance",
+    ("work", "kinetic_energy", "elastic_energy", "dissipation"),
+)  # fmt: skip
 def energy(dataset: xr.Dataset) -> Figure:
     """``work``, ``kinetic_energy``, ``elastic_energy`` and ``dissipation`` (time) of a run.
 
@@ -229,7 +226,7 @@ _TRIANGLE: dict[str, Any] = {
 _DOT: dict[str, Any] = {"color": style.INK, "markersize": 4, "clip_on": False}
 
 
-@style.styled
+@picture("run", 30, "Section by time: who is ahead", ("opening_angle", "asynchrony"), jointed)
 def section_map(dataset: xr.Dataset) -> Figure:
     """Deviation of each ``opening_angle`` (plane, section, time) from the mean of all, as a colour.
 
@@ -274,63 +271,3 @@ def section_map(dataset: xr.Dataset) -> Figure:
     figure.legend(handles=entries, loc="outside lower center", ncols=len(entries))
     style.head(figure, grid[0], dataset, "Ahead and behind")
     return figure
-
-
-# All figures that apply to a run.
-
-
-class _Picture(NamedTuple):
-    name: str
-    draw: Callable[[xr.Dataset], Figure]
-    needs: tuple[str, ...]
-    """Variables that must be recorded at one time at least."""
-    ring_only: bool = False
-
-
-PICTURES = (
-    _Picture("opening_angles", opening_angles, ("opening_angle",), ring_only=True),
-    _Picture("asynchrony", asynchrony, ("asynchrony", "opening_angle")),
-    _Picture("section_map", section_map, ("opening_angle", "asynchrony"), ring_only=True),
-    _Picture("rod_stress", rod_stress, ("rod_stress",), ring_only=True),
-    _Picture("ring", ring, ("opening_angle",), ring_only=True),
-    _Picture("cables", cables, ("cable_tension", "rope_strain"), ring_only=True),
-    _Picture("pulleys", pulleys, ("pulley_ratio", "opening_angle"), ring_only=True),
-    _Picture("nodal_forces", nodal_forces, ("cable_tension", "opening_angle"), ring_only=True),
-    _Picture("tension", tension_over_length, ("cable_tension", "cable_length")),
-    _Picture("bending_strain", strain_over_length, ("bending_strain", "cable_length")),
-    _Picture("drive", drive, ("drive_margin", "opening_angle")),
-    _Picture("energy", energy, ("work", "kinetic_energy", "elastic_energy", "dissipation")),
-)
-
-
-def draw_run(
-    dataset: xr.Dataset, folder: str | Path, name: str = "run", formats: Sequence[str] = ("png",)
-) -> list[Path]:
-    """Write every figure for which the run recorded something, as NAME-fig-FIGURE.png.
-
-    ``dataset`` is a run, finished or not, as ``ringsim.dataset.to_dataset`` makes it.  ``folder``
-    is created if it does not exist; ``formats`` are any of png, svg and pdf.  Returns the files
-    written, none if the run ended before its first record.
-
-    Raises
-    ------
-    InputError
-        If the folder or a file cannot be written.
-    """
-    folder = Path(folder)
-    scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    is_ring = isinstance(scene.structure, PantographRing)
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for subject, draw, needs, ring_only in PICTURES:
-        recorded = all(n in dataset and bool(np.isfinite(dataset[n]).any()) for n in needs)
-        if not recorded or (ring_only and not is_ring):
-            continue
-        figure = draw(dataset)
-        for kind in formats:
-            path = folder / f"{name}-fig-{subject}.{kind}"
-            with writing(folder):
-                style.write(figure, path)
-            written.append(path)
-    return written

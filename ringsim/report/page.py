@@ -8,31 +8,20 @@ from typing import Any, NamedTuple
 import jinja2
 import xarray as xr
 
-from ringsim.analysis.brief import (
-    budget_lines,
-    override_lines,
-    peak_lines,
-    restart_lines,
-    what_matters,
-    what_separates,
-)
-from ringsim.analysis.design import campaign_file, endings, inputs, paths_of, placement, scalars
-from ringsim.analysis.influence_text import influence_tables, sensitivity_tables
+from ringsim.analysis.campaign_notes import override_lines, peak_lines, restart_lines
+from ringsim.analysis.design import campaign_file, endings, inputs, paths_of
 from ringsim.analysis.intervals import good
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import error_table, outcome_table, verdict_table
-from ringsim.analysis.verdicts import stopping_lines
-from ringsim.analysis.worst import NOTE_ON_UNUSUAL, losses, worst_tables
+from ringsim.analysis.study_text import head_lines, outputs_in, sections
+from ringsim.analysis.worst import NOTE_ON_UNUSUAL
 from ringsim.campaign.specification import flat
 from ringsim.files import write_text
-from ringsim.plots.campaign.figures import figures_of
+from ringsim.plots.figures import figures_of
 from ringsim.plots.style import inline
 from ringsim.refusal import show
 from ringsim.report import tables
 from ringsim.report.player import player
-from ringsim.report.tables import rare_event
 from ringsim.scene import builtin_scenes
-from ringsim.tables import slim
 
 # The model of a campaign: every value of its scene, and where it comes from.
 
@@ -133,16 +122,11 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = values_of(campaign)
     figures = [(p.name, p.words, inline(f, p.name, p.words)) for p, f in figures_of(campaign)]
-    notes = [*restart_lines(campaign), *override_lines(campaign), *budget_lines(campaign)]
     shell = jinja2.Environment(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     shell.filters["sentence"] = _sentence
-    placed = placement(campaign)
-    lost = losses(campaign)
-    stopping = [line + lost.mark for line in stopping_lines(campaign, placed)]
-    names = scalars(campaign)
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
@@ -152,19 +136,16 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "not_run": int((endings(campaign) == "not run").sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
-        "outcomes": outcome_table(analysis), "tail": rare_event(campaign),
-        "statistics": tables.statistics(campaign, analysis),
-        "errors": slim(error_table(analysis, names)),
-        "no_population": "" if placed.population or not placed.kind else placed.told,
-        "verdicts": slim(verdict_table(analysis)),
-        "brief": [slim(what_matters(analysis)), slim(what_separates(analysis))],
-        "matters": [*influence_tables(analysis, names), *sensitivity_tables(analysis, names)],
+        "told": sections(analysis, folder), "notes_on_all": head_lines(analysis)[1:],
+        "names": {name: campaign[name].attrs.get("long_name", "") for name in outputs_in(analysis)
+                  if name in campaign},
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
-        "peaks": peak_lines(campaign), "stopping": stopping, "lost": lost.note,
+        "peaks": peak_lines(campaign),
         "figures": figures, "player": shown, "failures": failures, "more": more,
-        "worst": worst_tables(analysis, folder), "worst_note": NOTE_ON_UNUSUAL,
+        "worst_note": NOTE_ON_UNUSUAL,
         "players": {str(sample): k for sample, k in places.items()},
-        "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),
+        "notes": [*restart_lines(campaign), *override_lines(campaign)],
+        "inputs": tables.drawn(campaign),
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
         "provenance": list(tables.provenance(campaign)),
     }  # fmt: skip

@@ -8,18 +8,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.design import endings, judged_by, median_and_worst
+from ringsim.analysis.design import REACHED, UNKNOWN, endings, judged_by, median_and_worst
 from ringsim.analysis.intervals import used
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.points import points_of
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import COMPUTED, FROM_ANGLES, middle_of
-from ringsim.structures.pantograph_ring import PantographRing
 
 POSES = 25
 """Mean opening angles at which the ring is tabled: between two, lines are off by about 2 mm."""
 MOST_FRAMES, MOST_OTHERS = 240, 8
-UNKNOWN = -32768
+UNRECORDED = -32768
 """An opening angle that was not recorded."""
 _LARGEST = 32767
 _MOST_BYTES, _LEAST_FRAMES = 42_000, 30
@@ -27,13 +26,14 @@ _MOST_BYTES, _LEAST_FRAMES = 42_000, 30
 
 
 def player(campaign: xr.Dataset, analysis: xr.Dataset) -> dict[str, Any] | None:
-    """Data of the player for JSON; None if the structure is no ring, or nothing was recorded.
+    """Data of the player for JSON; None if the structure has no joints that open between two rods,
+    or nothing was recorded.
 
     Shown are the median and the worst sample, the worst of each failure in ``analysis``, then
     others that failed.
     """
     scene = scene_from_toml(str(campaign.attrs["scene"]), source="attribute scene")
-    if not isinstance(scene.structure, PantographRing) or "opening_angle" not in campaign:
+    if "opening_angle" not in campaign or not points_of(layout_of(scene)).openings.size:
         return None
     shown = [_course(campaign, *each) for each in _chosen(campaign, analysis)]
     if not shown:
@@ -58,7 +58,7 @@ def _chosen(campaign: xr.Dataset, analysis: xr.Dataset) -> list[tuple[int, str]]
         by = f" by {name}" if (name := judged_by(campaign)) else ""
         for sample, word in zip(both, ("median", "worst"), strict=True):
             found.setdefault(sample, [f"{word}{by}"])
-    fell_short = np.flatnonzero(~good | ~np.isin(words, ("deployed", "folded", "finished", "ok")))
+    fell_short = np.flatnonzero(~good | ~np.isin(words, (*REACHED, UNKNOWN)))
     # Those whose numbers do not hold first: nothing else on the page shows them.
     fell_short = fell_short[np.argsort(good[fell_short], kind="stable")]
     # A failure is no ending: what ended as "stalled" need not be told so twice.
@@ -104,7 +104,7 @@ def _course(campaign: xr.Dataset, sample: int, name: str) -> dict[str, Any]:
     rows = angle.to_numpy().reshape(len(places), -1)
     return {
         "name": name, "sample": sample, "times": np.round(angle["time"].to_numpy(), 4).tolist(),
-        "angles": packed(np.clip(100.0 * rows, UNKNOWN, _LARGEST)),
+        "angles": packed(np.clip(100.0 * rows, UNRECORDED, _LARGEST)),
         "lowest": float(rows.mean(axis=1).min()),
         "places": _places(campaign, sample),
     }  # fmt: skip

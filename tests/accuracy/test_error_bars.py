@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim.analysis.brief import budget_lines
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import error_lines, error_tables
 from ringsim.campaign.run import run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
@@ -268,25 +269,32 @@ def test_budget_says_which_error_dominates() -> None:
         attrs={"design": json.dumps({"kind": "random", "samples": 100})},
     )
     campaign.status[0] = 2
-    first, second = budget_lines(campaign)
     spread = values[1:].std(ddof=1)
-    assert first == (
-        f"deployment_time: mean {values[1:].mean():.6g} s, spread {spread:.2g}, standard error "
-        f"{spread / 99**0.5:.2g}, numerical error at most 0.02 (9 of 99 samples): sampling error "
-        "dominates the mean"
-    )
-    assert second.startswith("asynchrony_max: ")
-    assert "numerical error dominates" in second
+    assert "deployment_time" in error_lines(campaign)[2]
+    rows = errors_of(campaign)
+    first = rows["deployment_time"]
+    assert first["sampling (standard error)"] == f"{spread / 99**0.5:.2g}"
+    assert first["numerical (error bars)"] == "0.02"
+    assert first["samples with bars"] == "9"
+    assert first["largest bar"] == "0.02 (sample 10)"
+    assert first["dominates"] == "sampling (engines unknown)"
+    assert rows["asynchrony_max"]["dominates"] == "numerical (engines unknown)"
     # One Sobol design has no standard error, and a few replicates that of their means.
     one = {"kind": "sobol", "samples": 100}
-    assert budget_lines(campaign.assign_attrs(design=json.dumps(one)))[0].endswith(
-        f"spread {spread:.2g}, numerical error at most 0.02 (9 of 99 samples)"
-    )
+    alone = errors_of(campaign.assign_attrs(design=json.dumps(one)))["deployment_time"]
+    assert alone["sampling (standard error)"] == "-"
+    assert alone["numerical (error bars)"] == "0.02"
     campaign.status[0] = 0
     apart = campaign.assign(deployment_time=campaign.deployment_time + np.arange(100) % 4)
-    told = budget_lines(apart.assign_attrs(design=json.dumps(one | {"replicates": 4})))[0]
+    told = errors_of(apart.assign_attrs(design=json.dumps(one | {"replicates": 4})))
     means = apart.deployment_time.to_numpy().reshape(25, 4).mean(axis=0)
-    assert f"standard error {means.std(ddof=1) / 2:.2g}, " in told
+    assert told["deployment_time"]["sampling (standard error)"] == f"{means.std(ddof=1) / 2:.2g}"
+
+
+def errors_of(campaign: xr.Dataset) -> dict[str, dict[str, str]]:
+    """The row of each output in the error budget of an analysis."""
+    table = error_tables(analyse(campaign))[0]
+    return {row[0]: dict(zip(table.head, row, strict=True)) for row in table.rows}
 
 
 def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) -> None:

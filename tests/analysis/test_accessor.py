@@ -30,11 +30,18 @@ def campaign() -> xr.Dataset:
     return found
 
 
-@pytest.mark.parametrize("order", ["import ringsim, xarray", "import xarray, ringsim"])
+@pytest.mark.parametrize(
+    "order",
+    [
+        "import ringsim, xarray; ringsim.InputError", "import xarray, ringsim",
+        "import ringsim.analysis.accessor, xarray, ringsim",
+    ],
+)  # fmt: skip
 def test_every_dataset_has_it(order: str) -> None:
     """Whoever comes first, and without loading anything but xarray."""
     code = (
-        f"{order}, sys\nprint(type(xarray.Dataset().ring).__name__, 'scipy' in sys.modules)\n"
+        f"{order}\nimport sys\n"
+        "print(type(xarray.Dataset().ring).__name__, 'scipy' in sys.modules)\n"
         "import importlib; importlib.reload(ringsim)"
     )
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from made import drawn_campaign
-from ringsim.analysis.brief import output_table, what_matters, what_separates
+from ringsim.analysis.influence_text import what_matters, what_separates
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import told
+from ringsim.analysis.study_text import statistics_table, told
 from ringsim.sampling.designs.independent import RandomDesign, Sobol
 
 pytestmark = pytest.mark.quick
@@ -59,7 +59,7 @@ def test_designs_without_intervals_are_judged_by_what_chance_would_reach():
 
 
 def test_an_output_has_one_row_with_its_statistics(found):
-    (row,) = output_table(found, ["asynchrony_max"]).rows
+    (row,) = statistics_table(found).rows
     mean, *_, least, most = found.asynchrony_max.values
     assert [float(row[k]) for k in (2, 8, 9)] == pytest.approx([mean, least, most], rel=1e-3)
     assert row[-1] == "400"

@@ -7,7 +7,7 @@ import pytest
 
 from made import drawn_campaign
 from ringsim.analysis import indices
-from ringsim.analysis.brief import what_matters, what_separates
+from ringsim.analysis.influence_text import what_matters, what_separates
 from ringsim.analysis.study import analyse
 from ringsim.sampling.designs.independent import RandomDesign, Sobol
 

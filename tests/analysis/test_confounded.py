@@ -8,8 +8,8 @@ from scipy.stats import spearmanr
 
 from made import drawn_campaign
 from ringsim.analysis import indices
-from ringsim.analysis.brief import what_matters
 from ringsim.analysis.influence import pairs
+from ringsim.analysis.influence_text import what_matters
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.sampling.designs.independent import RandomDesign, Sobol

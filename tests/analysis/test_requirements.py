@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from loops import for_each
 
-from ringsim.analysis.verdicts import parse_requirements, read_requirements
+from ringsim.analysis import requirements
+from ringsim.analysis.requirements import Kind, parse_requirements, read_requirements
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
 
@@ -83,3 +85,17 @@ def test_a_campaign_refuses_what_its_scene_does_not_tell(tmp_path):
         load_campaign(file)
     file.write_text(text.replace("peak_tension", "asynchrony_max"))
     assert load_campaign(file).specification.requirements["asynchrony_max"].max == 10.0
+
+
+def test_a_kind_is_a_record_and_a_field(monkeypatch: pytest.MonkeyPatch) -> None:
+    size = Kind("size", "of size <=", lambda values, bound: np.abs(values) - bound)
+    monkeypatch.setattr(requirements, "KINDS", (*requirements.KINDS, size))
+
+    class Sized(requirements.Requirement):
+        size: float | None = None
+
+    wanted = Sized(size=2.0, max=1.5, **SHOWN)
+    assert wanted.told("peak_tension") == "peak_tension <= 1.5 N and of size <= 2 N"
+    assert wanted.beyond(np.array([-3.0, 1.0, 1.75])).tolist() == [1.0, -0.5, 0.25]
+    assert np.isnan(wanted.beyond(np.array([np.nan]))).all()
+    assert wanted.limits == [("max", 1.5), ("size", 2.0)]

@@ -90,12 +90,6 @@ def test_one_column_one_row_and_one_panel() -> None:
     assert meaning_of(made["temperature_joint_value"]) == f"cold: {PATHS[0]}"
 
 
-def test_files_without_names_still_have_one_column_of_paths_that_share() -> None:
-    made = shared(named=False)
-    assert [each for each in inputs(made) if "temperature" in each] == ["temperature_joint_value"]
-    assert [name for name in drawn(made).names if "temperature" in name] == PATHS[:1]
-
-
 def test_inputs_that_nothing_tells_apart_have_both_names() -> None:
     made = shared()
     says = {"role": "input", "path": "loads.force", "units": "N", "distribution": "listed"}

@@ -8,8 +8,8 @@ from scipy.stats import norm
 from made import drawn_campaign
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
+from ringsim.analysis.tails import tail_table
 from ringsim.plots.campaign.tornado import explained
-from ringsim.report.tables import rare_event
 from ringsim.sampling.designs.levels import SubsetSimulation
 
 pytestmark = pytest.mark.quick
@@ -43,19 +43,20 @@ def test_an_event_that_is_not_reached_is_bounded_and_never_told_as_zero(above, s
     assert (each == 0.0).sum() == short
     high = found.tail_reached_probability_interval.values[1]
     assert norm.sf(above) < high < 0.5
-    (line,) = [each for each in told(found) if each.startswith("probability of")]
-    assert f"degree: below {high:.2g}, since {short} of 4 replicates did not reach it;" in line
-    assert f"the nearest run has {made.asynchrony_max.values.max():.6g} degree" in line
-    assert ": 0" not in line.replace(": 0.", "")
-    rows = dict(rare_event(made).rows)
-    assert rows["probability"].startswith(f"below {high:.2g}")
+    table = tail_table(found)
+    assert table.head[1] == f"asynchrony_max > {above:g} degree"
+    told_of = dict(table.rows)["probability"]
+    assert told_of == f"below {high:.2g}, since {short} of 4 replicates did not reach it"
+    assert f"the nearest run has {made.asynchrony_max.values.max():.6g} degree" in table.notes
+    assert {*table.notes, table.lines()[0]} <= {*told(found)}
 
 
 def test_an_event_that_all_reached_has_its_probability():
     found = analyse(campaign(2.5, 8))
     assert "tail_reached_probability" not in found
     assert found.tail_probability_interval.values[0] < norm.sf(2.5)
-    assert "below" not in told(found)[1]
+    (probability,) = [text for what, text in tail_table(found).rows if what == "probability"]
+    assert float(probability) == pytest.approx(found.tail_probability.item(), rel=5e-3)
 
 
 def test_samples_of_chains_are_not_judged_as_independent():

@@ -11,9 +11,9 @@ import xarray as xr
 from made_campaign import made_campaign
 
 from made import campaign
+from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
-from ringsim.analysis.verdicts import read_requirements
 from ringsim.analysis.worst import unusual, worst, worst_lines
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status

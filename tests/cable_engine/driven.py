@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from ringsim.exudyn.assembly import turn_rates
 from ringsim.exudyn.build import Built, build
 from ringsim.exudyn.cables import CableDrive
+from ringsim.parts.faults import Faults, Struck
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame
 from ringsim.variables import Outcome
@@ -129,8 +130,15 @@ class Bench:
     def strike(self, place: Array, rates: Array, time: float) -> None:
         """Let the scene's faults happen at a state."""
         state, _ = self.drive.evaluate(place, rates, time)
-        angles = np.zeros((2, self.scene.structure.sections))
-        assert self.built.faults.strike(time, angles, state)
+        folded, laws = np.zeros((2, self.scene.structure.sections)), self.built.angles
+        ropes = self.drive.ropes, state.stored, state.wound
+        struck = Struck(self.scene.structure.planes, laws.switches, folded, *ropes)
+        due = Faults(self.scene.faults).due(time)
+        assert due
+        for fault in due:
+            fault.strike(struck)
+        laws.follow()
+        self.drive.take(struck.ropes)
 
     def jacobian(self, place: Array, rates: Array, by_rate: float, *, whole: bool = True) -> Array:
         """d(-force)/dq + by_rate * d(-force)/dq_t, auxiliary unknowns eliminated.

@@ -27,7 +27,7 @@ def test_a_finished_campaign_is_drawn_and_reported(bench):
     page = (bench.folder / "page.html").read_text()
     with xr.open_dataset(bench.folder / "out" / "campaign.nc") as campaign:
         words = endings(campaign).tolist()
-    assert set(words) == {"deployed", "stalled", "failed: solver failed"}
+    assert set(words) == {"deployed", "stalled", "lost: solver failed"}
     # What ended alike shares a row, with the command that repeats the first of them.
     for word in set(words):
         own = [str(sample) for sample, each in enumerate(words) if each == word]

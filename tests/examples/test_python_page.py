@@ -12,8 +12,7 @@ from click.testing import CliRunner
 from scipy.io import loadmat
 
 from ringsim.cli import cli
-from ringsim.plots import animation
-from ringsim.plots.campaign import figures
+from ringsim.plots import animation, figures
 
 ONE_PICTURE = tuple(one for one in figures.PICTURES if one.name == "distributions")
 

@@ -74,9 +74,13 @@ def inside(thing: Any) -> dict[Any, Any] | None:
     return own
 
 
+BEGUN_ANEW = "until", "_states", "_cables"
+"""Of cables see below: what they keep is of one step."""
+
+
 def parts(run: Storing) -> dict[str, Any]:
     """All that a run has, but the states that it has stored."""
-    own = {name: value for name, value in vars(run).items() if name not in ("until", "_states")}
+    own = {name: value for name, value in vars(run).items() if name not in BEGUN_ANEW}
     cables = run._model.cables
     own["laws"] = run._model.laws
     return own if cables is None else own | {"winches": cables.winches, "ropes": cables.ropes}

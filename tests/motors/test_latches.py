@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from motor_rings import MOTOR, STALL, ring
 from ringsim.analysis.design import endings
 from ringsim.analysis.intervals import quantities
-from ringsim.analysis.verdicts import Requirement, violations
+from ringsim.analysis.requirements import Requirement, violations
 from ringsim.outputs.family import Run, Series
 from ringsim.outputs.joints import FastestLatch, Latching
 from ringsim.parts.joints import Latch

@@ -10,15 +10,15 @@ import xarray as xr
 from made_campaign import made_campaign, with_motors
 
 from motor_rings import ring
+from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import told
-from ringsim.analysis.verdicts import read_requirements
+from ringsim.analysis.study_text import statistics_table, told
 from ringsim.execution.work import solve
-from ringsim.plots.campaign import figures
+from ringsim.plots import figures
 from ringsim.refusal import InputError
-from ringsim.report import tables
 from ringsim.report.page import page
 from ringsim.rigid.margin import MOST, DriveMargin, with_margin
+from ringsim.tables import slim
 from ringsim.variables import PLANES, Fate, Outcome, Status
 
 REQUIRED = {
@@ -95,16 +95,16 @@ def test_the_report_shows_them(campaign: xr.Dataset, monkeypatch: pytest.MonkeyP
     text = page(campaign, "runs/made", analyse(campaign))
     for name in names:
         assert f'id="figure-{name}"' in text
-    assert "<td>smallest static margin of the drive at any angle that the run passed</td>" in text
-    assert '<th scope="col">Mean</th>' in text
+    assert "<dd>smallest static margin of the drive at any angle that the run passed</dd>" in text
+    assert '<th scope="col">mean</th>' in text
 
 
 def test_a_grid_has_extremes_and_no_means(campaign: xr.Dataset) -> None:
     listed = campaign.assign_attrs(design='{"kind": "grid"}')
     for kind, made in (("random", campaign), ("grid", listed)):
-        table = tables.statistics(made, analyse(made))
+        table = slim(statistics_table(analyse(made)))
         heads, rows = table.head, table.rows
-        assert ("Mean" in heads) == (kind == "random")
+        assert ("std. dev." in heads) == (kind == "random")
         assert {len(row) for row in rows} == {len(heads)}
         (convergence,) = (each for each in figures.PICTURES if each.name == "convergence")
-        assert convergence.of(made) == (kind == "random")
+        assert convergence.applies(made) == (kind == "random")

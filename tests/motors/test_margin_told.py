@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from motor_rings import ring
 from ringsim.cli import cli
 from ringsim.parts.margin import EcssMechanisms
-from ringsim.plots import run
+from ringsim.plots import figures
 from ringsim.plots.rods_and_cables import drive
 from ringsim.rigid.margin import DriveMargin
 from ringsim.scene import Scene
@@ -77,8 +77,10 @@ def test_a_run_draws_what_resists_and_its_least_margin(
     scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = simulate(scene, "frame")
-    monkeypatch.setattr(run, "PICTURES", [each for each in run.PICTURES if each[0] == "drive"])
-    assert [p.name for p in run.draw_run(found, tmp_path, formats=["svg"])] == ["run-fig-drive.svg"]
+    monkeypatch.setattr(figures, "PICTURES", [p for p in figures.PICTURES if p.name == "drive"])
+    assert [p.name for p in figures.draw_figures(found, tmp_path, formats=["svg"])] == [
+        "run-fig-drive.svg"
+    ]
     figure = drive(found)
     upper, lower = figure.axes
     labels = upper.get_legend_handles_labels()[1]

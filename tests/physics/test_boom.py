@@ -150,7 +150,7 @@ def test_a_prismatic_joint_holds_the_turns_that_a_sleeve_leaves() -> None:
         one = exact.run().outcome().values
         nodes = [built.model.bodies[plane[0]][1] for plane in built.model.layout.corners]
         where = np.array([built.model.assembly.coordinates_of(node)[3:] for node in nodes])
-        turns = axes_of(exact._state.position[where])
+        turns = axes_of(exact._now.position[where])
         run = Frames(FrameModel(scene))
         two = run.run().outcome().values
         for upper, lower in (

@@ -14,9 +14,8 @@ from PIL import Image
 
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.plots import animation
+from ringsim.plots import animation, figures
 from ringsim.plots.animation import stage
-from ringsim.plots.campaign import figures
 from ringsim.plots.ring import facing_azimuth, view
 from ringsim.shapes import COMPUTED, FROM_ANGLES, shape_of
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,9 @@ from ringsim.plots import style
 from ringsim.plots.campaign import endings
 from ringsim.plots.campaign.courses import lock_order, shares
 from ringsim.plots.campaign.endings import base_load, margin, motors, tension
-from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
 from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
 from ringsim.plots.campaign.tornado import moves, named, one_by_one
+from ringsim.plots.figures import PICTURES, draw_figures, figures_of
 from ringsim.variables import Fate
 
 GOOD = [0, 1, 3, 4, 6]
@@ -36,8 +37,9 @@ def mixed() -> xr.Dataset:
 
 def names_for(campaign: xr.Dataset) -> set[str]:
     """Figures of what campaigns of the kind hold."""
-    absent = {each.name for each in PICTURES if not set(each.needs) <= set(campaign)}
-    return {each.name for each in PICTURES} - absent - {"rare_event", "one_by_one"}
+    own = [each for each in PICTURES if each.of == "campaign"]
+    absent = {each.name for each in own if not set(each.needs) <= set(campaign)}
+    return {each.name for each in own} - absent - {"rare_event", "one_by_one"}
 
 
 def words(figure: Figure) -> str:
@@ -118,7 +120,7 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     figure = by_input(mixed)
     points = {c.get_label(): c.get_offsets() for c in figure.axes[1].collections}
     assert {name: len(at) for name, at in points.items()} == {
-        "deployed (5)": 5, "failed: timeout (2)": 2,
+        "deployed (5)": 5, "lost: timeout (2)": 2,
     }  # fmt: skip
     np.testing.assert_allclose(points["deployed (5)"][:, 0], np.array(GOOD) + 1.0)
     np.testing.assert_allclose(points["deployed (5)"][:, 1], mixed["asynchrony_max"].values[GOOD])
@@ -134,7 +136,7 @@ def test_no_figure_drops_a_sample_in_silence(mixed: xr.Dataset) -> None:
         if picture.name == "by_input":
             assert "7 of 8 samples run; 2 without" in told
         else:
-            assert "5 of 8 samples; left out: 2 failed: timeout, 1 not run" in told, picture.name
+            assert "5 of 8 samples; left out: 2 lost: timeout, 1 not run" in told, picture.name
 
 
 def test_the_median_is_a_sample_and_the_worst_has_the_largest_asynchrony(
@@ -158,7 +160,7 @@ def test_all_figures_of_a_file(tmp_path: Path, mixed: xr.Dataset) -> None:
 def test_campaigns_in_which_nothing_deployed(
     choice: dict[str, tuple[int, ...]], tmp_path: Path
 ) -> None:
-    names = {path.stem for path in draw_campaign(made_campaign(2, **choice), tmp_path)}
+    names = {path.stem for path in draw_figures(made_campaign(2, **choice), tmp_path, "campaign")}
     stalled = {"distributions", "convergence", "fan", "lag_map", "tension", "by_input"}
     expected = stalled if "stalled" in choice else {"by_input"} if "failed" in choice else set()
     assert names == {f"campaign-fig-{name}" for name in expected}
@@ -187,7 +189,8 @@ def test_the_margin_by_ending_and_over_the_angle() -> None:
     np.testing.assert_allclose(stalled.get_ydata(), (angle - 20.0) / 160.0, atol=1e-9)
     band = lower.collections[1].get_paths()[0].vertices
     assert band[:, 1].min() == pytest.approx(-0.1)
-    campaign.attrs["requirements"] = '{"least_drive_margin": {"min": -0.3, "probability": 0.9}}'
+    wanted = {"least_drive_margin": {"min": -0.3, "probability": 0.9, "confidence": 0.9}}
+    campaign.attrs["requirements"] = json.dumps(wanted)
     assert [t.get_text() for t in margin(campaign).axes[0].texts] == ["required -0.3"]
 
 

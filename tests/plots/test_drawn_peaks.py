@@ -8,10 +8,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from ringsim.plots.figures import draw_figures
 from ringsim.plots.peaks import peak_of
 from ringsim.plots.ring import strain_over_length, tension_over_length
 from ringsim.plots.rods_and_cables import cables, rod_stress
-from ringsim.plots.run import asynchrony, draw_run
+from ringsim.plots.run import asynchrony
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 
@@ -136,6 +137,6 @@ def test_a_plane_without_a_cable_has_no_column(truss):
 
 
 def test_every_figure_of_a_truss_is_written(truss, tmp_path):
-    paths = draw_run(truss, tmp_path, "truss2")
+    paths = draw_figures(truss, tmp_path, "truss2")
     assert len(paths) == 9
     assert all(path.name.startswith("truss2-fig-") for path in paths)

@@ -8,24 +8,26 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
+import xarray as xr
 from loops import for_each
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 
 from ringsim.dataset import to_dataset
 from ringsim.outputs import VARIABLES
+from ringsim.plots import figures, registry
+from ringsim.plots.figures import PICTURES, draw_figures, figures_of, left_out
 from ringsim.plots.ring import ring
 from ringsim.plots.rods_and_cables import default_sections, rod_stress
 from ringsim.plots.run import (
-    PICTURES,
     asynchrony,
-    draw_run,
     energy,
     imbalance,
     opening_angles,
     section_map,
 )
 from ringsim.refusal import InputError
-from ringsim.scene import scene_from_toml
+from ringsim.scene import load_scene, scene_from_toml
 from ringsim.variables import Fate, Outcome, Status
 
 DRAWINGS = [opening_angles, asynchrony, rod_stress, energy, ring, section_map]
@@ -235,10 +237,10 @@ OF_RINGS = {"opening_angles", "asynchrony", "section_map", "rod_stress", "ring",
 
 
 def test_only_figures_that_apply_are_written(tmp_path, deployed, scene_of, made_run):
-    names = {path.name for path in draw_run(deployed, tmp_path / "all")}
+    names = {path.name for path in draw_figures(deployed, tmp_path / "all")}
     assert names == {f"run-fig-{name}.png" for name in OF_RINGS}
     plain = made_run(scene_of(6, parts=False), stress=False)
-    paths = draw_run(plain, tmp_path / "plain")
+    paths = draw_figures(plain, tmp_path / "plain")
     assert "run-fig-rod_stress.png" not in {path.name for path in paths}
     assert len(paths) == len(OF_RINGS) - 1
     for path in paths:
@@ -247,25 +249,25 @@ def test_only_figures_that_apply_are_written(tmp_path, deployed, scene_of, made_
 
 
 def test_runs_that_ended_early_are_drawn_as_far_as_they_got(tmp_path, failed, unfinished):
-    assert len(draw_run(failed, tmp_path)) == len(OF_RINGS)
-    assert len(draw_run(unfinished, tmp_path)) == len(OF_RINGS)
+    assert len(draw_figures(failed, tmp_path)) == len(OF_RINGS)
+    assert len(draw_figures(unfinished, tmp_path)) == len(OF_RINGS)
 
 
 def test_a_single_record_can_be_drawn(tmp_path, scene_of, made_run):
     run = made_run(scene_of(6), status=Status.DIVERGED, until=0.01)
-    assert len(draw_run(run, tmp_path)) == len(OF_RINGS)
+    assert len(draw_figures(run, tmp_path)) == len(OF_RINGS)
 
 
 def test_a_run_without_records_has_no_figures(tmp_path, deployed):
     scene = scene_from_toml(deployed.attrs["scene"], source="test")
     crashed = to_dataset(Outcome(Status.CRASHED, "the solver process died"), scene)
-    assert draw_run(crashed, tmp_path) == []
+    assert draw_figures(crashed, tmp_path) == []
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path, deployed):
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(InputError, match="taken"):
-        draw_run(deployed, tmp_path / "taken")
+        draw_figures(deployed, tmp_path / "taken")
 
 
 def test_every_drawn_variable_is_defined():
@@ -297,3 +299,25 @@ def test_a_long_ending_stands_clear_of_what_is_above_the_axes(deployed):
     ending = title.get_window_extent()
     assert ending.height > 1.5 * lock.get_window_extent().height  # two lines
     assert not ending.overlaps(lock.get_window_extent())
+
+
+def test_a_structure_without_joints_between_rods_is_told_what_is_not_drawn(
+    deployed: xr.Dataset,
+) -> None:
+    planar = deployed.assign_attrs(scene=load_scene("planar-truss").to_toml())
+    drawn = {each.name for each, _ in figures_of(planar)}
+    assert not drawn & {"opening_angles", "ring", "cables"}
+    assert left_out(planar).startswith("not drawn: opening_angles, section_map, ")
+    assert left_out(deployed) == ""
+
+
+def test_a_figure_is_one_entry(deployed: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "known", dict(registry.known))
+
+    @registry.picture("run", 15, "Nothing", ("asynchrony",))
+    def nothing(run: xr.Dataset) -> Figure:
+        return Figure()
+
+    made = registry.known["run", "nothing"]
+    monkeypatch.setattr(figures, "PICTURES", (made, *figures.PICTURES))
+    assert next(figures_of(deployed))[0] is made

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
-from ringsim.plots import run as pictures
+from ringsim.plots import figures as pictures
 
 ROOT = Path(__file__).parents[2]
 STARTS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -30,7 +30,7 @@ def file(failed: xr.Dataset, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def _two_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    few = [each for each in pictures.PICTURES if each[0] in ("ring", "energy")]
+    few = [each for each in pictures.PICTURES if each.name in ("ring", "energy")]
     monkeypatch.setattr(pictures, "PICTURES", few)
 
 

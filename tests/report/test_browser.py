@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from made_campaign import made_campaign, with_positions
 
-from ringsim.plots.campaign import figures
+from ringsim.plots import figures
 from ringsim.report.page import page
 from ringsim.shapes import COMPUTED, FROM_ANGLES
 

@@ -15,11 +15,11 @@ import xarray as xr
 from click.testing import CliRunner
 from made_campaign import made_campaign, with_motors
 
-from ringsim.analysis.brief import notes
+from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.study_text import verdict_lines
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.plots.campaign import figures
+from ringsim.plots import figures
 from told_numbers import (
     FATES,
     LOSSES,
@@ -319,6 +319,10 @@ def errors(file: File, rows: list[dict[str, str]]) -> None:
         if row["error of the mean of"] == "peak_tension":
             bars = np.sqrt(np.mean((0.01 * values) ** 2))
             agrees(row["numerical (error bars)"], bars, digits=2)
+            assert row["samples with bars"] == str(len(values))
+            most, sample = re.fullmatch(r"(\S+) \(sample (\d+)\)", row["largest bar"]).groups()
+            agrees(most, 0.01 * values.max(), digits=2)
+            assert file.values["peak_tension"][int(sample)] == values.max()
             larger = "numerical" if bars > sampling else "sampling"
             assert row["dominates"] == f"{larger} (engines unknown)"
     assert "peak_tension" in {row["error of the mean of"] for row in rows}
@@ -366,19 +370,27 @@ def failing(file: File) -> int:
     )
 
 
+CHECKS = {
+    "outcome": outcomes, "output": outputs, "error of the mean of": errors,
+    "what matters for": matters, "what separates": separates,
+    "error of the solution": lambda file, rows: balance(file, rows),
+}  # fmt: skip
+"""What checks the rows of a table, by the head of its first column."""
+
+
 def test_analyse_says_what_the_file_holds(told: tuple[File, list[str], str, list[str]]) -> None:
     file, lines, _, _ = told
     tables, others = text_tables(lines)
-    checks = {
-        "outcome": outcomes, "output": outputs, "error of the mean of": errors,
-        "what matters for": matters, "what separates": separates,
-        "requirement": lambda file, rows: verdicts(file, rows, others),
-    }  # fmt: skip
     assert (
-        {"outcome", "output", "what matters for", "requirement"} <= tables.keys() <= checks.keys()
+        {"outcome", "output", "what matters for", "requirement"}
+        <= tables.keys()
+        <= {*CHECKS, "requirement"}
     )
     for name, rows in tables.items():
-        checks[name](file, rows)
+        if name == "requirement":
+            verdicts(file, rows, others)
+        else:
+            CHECKS[name](file, rows)
     words, seen, ways = "", list[int](), 0
     for k, line in enumerate(others):
         if line.startswith("worst of: "):
@@ -397,42 +409,29 @@ def test_the_report_says_what_the_file_holds(told: tuple[File, list[str], str, l
     page = Tables(text)
     texts = [" ".join(each.split()) for each in page.texts]
     assert any(f"{file.ok.sum()} of {COUNT} have numbers that hold" in each for each in texts)
-    known = {"model-table", "inputs-table", "truth-table", "failures-table"}
+    known = {"model-table", "inputs-table", "failures-table"}
     for name in page.found:
         if name.startswith("worst-table"):
             words = heads(file, page.found[name][0][0].lower() + page.found[name][0][1:])
             seen = list[int]()
             for row in page.rows(name):
-                sample, odd = int(row["Sample, the worst first"]), row["Unusual in its inputs"]
-                worst_sample(file, words, sample, row["Found"], odd, seen)
-                assert row["Run it again"].endswith(f" {sample}")
-                assert row["Player"] in (f"show {sample}", "-")
+                sample, odd = int(row["sample"]), row["unusual in its inputs"]
+                worst_sample(file, words, sample, row["found"], odd, seen)
+                assert row["run it again"].endswith(f" {sample}")
+                assert row["player"] in (f"show {sample}", "-")
                 seen.append(sample)
-        elif name == "outcomes-table":
-            outcomes(file, page.rows(name))
-        elif name == "verdicts-table":
+        elif name == "requirements-table":
             verdicts(file, page.rows(name), texts)
-        elif name == "statistics-table":
-            statistics(file, page.rows(name))
-        elif name == "errors-table":
-            errors(file, page.rows(name))
-        elif name.startswith("brief-table"):
-            rows = page.rows(name)
-            (matters if "what matters for" in rows[0] else separates)(file, rows)
-        elif name.startswith("matters-table"):
+        elif name.startswith("every-matters-table"):
             measures(file, page.rows(name))
+        elif name == "every-statistics-table":
+            statistics(file, page.rows(name))
         else:
-            assert name in known, name
+            heads_of = {row: of for row, of in CHECKS.items() if row in page.found[name][1][0]}
+            assert heads_of or name in known, name
+            for check in heads_of.values():
+                check(file, page.rows(name))
     assert sum(name.startswith("worst-table") for name in page.found) == failing(file)
-    for row in page.rows("truth-table"):
-        name = next(n for n, words in file.words.items() if words == row["Error"])
-        values = file.of(name)
-        middle = np.median(values) if "median" in row["Typical"] else np.sqrt(np.mean(values**2))
-        agrees(row["Typical"].split()[0], middle, digits=2)
-        most, sample = re.fullmatch(r"(\S+) \(sample (\d+)\)", row["Largest"]).groups()
-        agrees(most, values.max(), digits=2)
-        assert file.values[name][int(sample)] == values.max()
-        assert row["Samples"] == str(len(values))
     assert [row["Input"] for row in page.rows("inputs-table")] == [*file.inputs]
     for row in page.rows("inputs-table"):
         extent = np.sort(file.input(row["Input"]))[[0, -1]]
@@ -448,35 +447,45 @@ def test_the_report_says_what_the_file_holds(told: tuple[File, list[str], str, l
 
 
 def statistics(file: File, rows: list[dict[str, str]]) -> None:
+    """The table with a row a statistic."""
+    assert {"mean", "standard deviation", "minimum"} <= {row["statistic"] for row in rows}
     for row in rows:
-        name = next(n for n, words in file.words.items() if words == row["Number"])
+        name, word = row["output"], row["statistic"]
         values = file.of(name)
-        for word, value, ends in (
-            ("Mean", values.mean(), bootstrap(values, "mean")),
-            ("Std. dev.", values.std(ddof=1), bootstrap(values, "std")),
-            ("Median", np.quantile(values, 0.5), quantile_interval(values, 0.5)),
-            ("5 %", np.quantile(values, 0.05), quantile_interval(values, 0.05)),
-            ("95 %", np.quantile(values, 0.95), quantile_interval(values, 0.95)),
-        ):
-            number, _, interval = row[word].partition(" (")
-            agrees(number, value)
-            if word in ("Mean", "Std. dev."):
-                # Of the spread there are several good intervals, which differ by their ends' tails.
-                near(interval.rstrip(")"), ends, 0.1 if word == "Mean" else 0.4)
-            else:
-                interval_agrees(interval.rstrip(")") or "-", ends)
-        for word, end in (("Least (sample)", values.min()), ("Largest (sample)", values.max())):
-            number, sample, bar = re.fullmatch(r"(\S+) \((\d+)(?:, ± (\S+))?\)", row[word]).groups()
-            agrees(number, end)
-            assert (bar is not None) == (name == "peak_tension")
-            if bar is not None:
-                agrees(bar, 0.01 * end, digits=2)
-            assert file.values[name][int(sample)] == end
-            assert file.ok[int(sample)]
-        assert row["Worst sample"] == str(file.worst(name)[0])
-        assert row["Used"] == str(len(values))
-        assert row["Lost"] == str(file.lost.sum())
-        assert row["No value"] == str(file.ok.sum() - len(values))
+        levels = {"quantile 05": 0.05, "median": 0.5, "quantile 95": 0.95}
+        if word in levels:
+            agrees(row["estimate"], np.quantile(values, levels[word]))
+            interval_agrees(row["95 % interval"], quantile_interval(values, levels[word]))
+        elif word in ("mean", "standard deviation"):
+            # Of the spread there are several good intervals, which differ by their ends' tails.
+            of, most = ("mean", 0.1) if word == "mean" else ("std", 0.4)
+            agrees(row["estimate"], values.mean() if word == "mean" else values.std(ddof=1))
+            near(row["95 % interval"], bootstrap(values, of), most)
+        else:
+            end, sample = values.min() if word == "minimum" else values.max(), int(row["in sample"])
+            agrees(row["estimate"], end)
+            assert file.values[name][sample] == end
+            assert file.ok[sample]
+            assert (row["its error bar"] != "-") == (name == "peak_tension")
+            if name == "peak_tension":
+                agrees(row["its error bar"], 0.01 * end, digits=2)
+        if word not in ("minimum", "maximum"):
+            assert row["in sample"] == row["its error bar"] == "-"
+        assert row["used"] == str(len(values))
+        assert row["lost"] == str(file.lost.sum())
+        assert row["no value"] == str(file.ok.sum() - len(values))
+
+
+def balance(file: File, rows: list[dict[str, str]]) -> None:
+    """Errors of the solution itself."""
+    for row in rows:
+        name = next(n for n, words in file.words.items() if words == row["error of the solution"])
+        values = file.of(name)
+        agrees(row["median"], np.median(values), digits=2)
+        most, sample = re.fullmatch(r"(\S+) \(sample (\d+)\)", row["largest"]).groups()
+        agrees(most, values.max(), digits=2)
+        assert file.values[name][int(sample)] == values.max()
+        assert row["samples"] == str(len(values))
 
 
 def measures(file: File, rows: list[dict[str, str]]) -> None:

@@ -8,7 +8,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from ringsim import simulation
-from ringsim.analysis.brief import restart_lines
+from ringsim.analysis.campaign_notes import restart_lines
 from ringsim.campaign import accuracy
 from ringsim.cli import cli
 from ringsim.dataset import to_dataset

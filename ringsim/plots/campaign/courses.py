@@ -8,22 +8,28 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from ringsim.analysis.courses import Courses, course, courses
-from ringsim.analysis.design import median_and_worst, told
+from ringsim.analysis.design import judged_by, median_and_worst, told
 from ringsim.analysis.intervals import good
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head
+from ringsim.plots.registry import picture
 from ringsim.plots.run import LEAST_SPAN
 
 # How far each section is ahead or behind, over all samples.
 
 
+_NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")
+"""Asynchrony first: without a value of it there is nothing to draw."""
 _LOOKS = ((style.BLUE, "solid", 1.9), (style.ORANGE, (0, (3, 1.5)), 1.2))
 """Colour, dashes and width of each plane's median: alike ones are both seen, one on the other."""
 _WIDEST = 6
 
 
-@style.styled
+@picture(
+    "campaign", 50, "Deviation of each section from the mean opening angle, over all samples",
+    _NEEDS, judged_by, courses,
+)  # fmt: skip
 def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     """A panel a section: median, 5-95 % and 0-100 % of its deviation, in each plane; a row of
     panels has one scale.
@@ -98,7 +104,10 @@ def _limits(drawn: list[xr.DataArray], sections: slice) -> tuple[float, float]:
 # Section by time: the lag of the median over the samples, and of the worst sample.
 
 
-@style.styled
+@picture(
+    "campaign", 60, "Section by time: lag of the median and of the worst sample",
+    _NEEDS, judged_by, courses,
+)  # fmt: skip
 def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     """Deviation from the mean opening angle as a colour: at each place the median of all samples,
     beside the sample with the largest asynchrony, with one colour scale.  ``read`` is what
@@ -166,7 +175,7 @@ def shares(campaign: xr.Dataset) -> tuple[Array, Array, Array]:
     return first, last, never
 
 
-@style.styled
+@picture("campaign", 70, "How often each V-joint locks first, last and not at all", ("lock_time",))
 def lock_order(campaign: xr.Dataset) -> Figure:
     """Bars by plane and section from ``lock_time`` (sample, plane, section)."""
     sections, planes = campaign["section"].values, campaign["plane"].values.tolist()

@@ -1,7 +1,6 @@
 """Courses by how samples ended: bands, margins, motors, base, tensions."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,11 +10,12 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import ends
-from ringsim.analysis.design import blocks, endings, requirements_of, told, values_of
+from ringsim.analysis.design import blocks, endings, told, values_of
 from ringsim.analysis.intervals import good, used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import FAILED, LOOKS, bands, head
+from ringsim.plots.campaign.frame import bands, head, legend, limits, looks_of
+from ringsim.plots.registry import picture
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
 
@@ -48,30 +48,16 @@ def counted(campaign: xr.Dataset, words: NDArray[np.str_]) -> str:
 
 def bands_by_ending(axes: Axes, x: Array, values: Array, words: NDArray[np.str_]) -> None:
     """Range and median of the curves (sample, x) of each ending, as long as any of them lasts."""
-    others = sorted(set(words.tolist()) - LOOKS.keys())
-    looks = LOOKS | dict(zip(others, FAILED, strict=False))
-    for number, word in enumerate(filter(set(words.tolist()).__contains__, looks)):
+    for number, (word, (colour, _)) in enumerate(looks_of(words).items()):
         own = values[words == word]
         own = own[:, known := np.isfinite(own).any(axis=0)]
         if not own.size:
             continue
-        colour = looks[word][0]
         axes.fill_between(x[known], np.nanmin(own, axis=0), np.nanmax(own, axis=0), color=colour,
                           alpha=0.22, linewidth=0.0)  # fmt: skip
         dashes = ("solid", (0, (5, 2)), (0, (2, 1.5)), (0, (6, 1.5, 1, 1.5)))[number % 4]
         axes.plot(x[known], np.nanmedian(own, axis=0), color=colour, linestyle=dashes,
                   label=f"{word} ({len(own)})")  # fmt: skip
-
-
-def legend(figure: Figure, panels: Sequence[Axes]) -> None:
-    """One legend of all panels below the figure."""
-    found = dict[str, Any]()
-    for axes in panels:
-        handles, labels = axes.get_legend_handles_labels()
-        found |= dict(zip(labels, handles, strict=True))
-    figure.legend(
-        [*found.values()], [*found], loc="outside lower center", ncols=max(1, min(4, len(found)))
-    )
 
 
 def over_time(
@@ -87,7 +73,7 @@ def over_time(
             last = max(last, int(known[-1]))
     panels[0].set_xlim(time[0], time[max(last, 1)])
     panels[-1].set_xlabel(style.label(campaign["time"]))
-    legend(figure, panels)
+    legend(figure, panels, 4)
 
 
 # What the base carries over time, by ending.
@@ -96,7 +82,10 @@ def over_time(
 _WORDS = {"base_force": "force at the base", "base_torque": "torque at the base"}
 
 
-@style.styled
+@picture(
+    "campaign", 120, "Force and torque at the base over time, by ending",
+    ("base_force", "base_torque"), name="base",
+)  # fmt: skip
 def base_load(campaign: xr.Dataset) -> Figure:
     """Magnitudes of ``base_force`` and ``base_torque`` (sample, axis, time)."""
     read, words = chosen(campaign, [*_WORDS])
@@ -122,7 +111,10 @@ _GOLDEN = 0.618034
 _ANGLES = 161
 
 
-@style.styled
+@picture(
+    "campaign", 40, "Smallest margin of the drive by ending, and its course",
+    ("drive_margin", "least_drive_margin", "opening_angle"),
+)  # fmt: skip
 def margin(campaign: xr.Dataset) -> Figure:
     """``least_drive_margin`` (sample) by ending; below, ``drive_margin`` (sample, time) over the
     mean opening angle.
@@ -142,8 +134,7 @@ def margin(campaign: xr.Dataset) -> Figure:
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
     lower.set_ylabel("Margin of the drive")
     lower.set_xlabel("Mean opening angle (degree)")
-    handles, labels = lower.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=max(1, min(4, len(labels))))
+    legend(figure, [lower], 4)
     note = f"{counted(campaign, words)} Dashed: the margin of 0 that the standard requires."
     head(figure, campaign, "Drive margin", note)
     return figure
@@ -152,20 +143,16 @@ def margin(campaign: xr.Dataset) -> Figure:
 def _strips(axes: Axes, campaign: xr.Dataset, samples: Array, values: Array) -> None:
     """A row an ending, a mark a sample at its smallest margin; limits of the campaign."""
     words = endings(campaign)[np.searchsorted(campaign["sample"].to_numpy(), samples)]
-    others = sorted(set(words.tolist()) - LOOKS.keys())
-    looks = LOOKS | dict(zip(others, FAILED, strict=False))
-    shown = [word for word in looks if (words == word).any()]
-    for row, word in enumerate(shown):
+    shown = looks_of(words)
+    for row, (word, (colour, marker)) in enumerate(shown.items()):
         own = values[words == word]
         heights = row + 0.5 * (np.arange(len(own)) * _GOLDEN % 1.0 - 0.5)
-        colour, marker = looks[word]
         axes.scatter(own, heights, s=22, color=colour, marker=marker, alpha=0.7, linewidths=0.5,
                      rasterized=len(own) > 500)  # fmt: skip
     axes.set_yticks(range(len(shown)), [f"{word} ({(words == word).sum()})" for word in shown])
     axes.set_ylim(len(shown) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
-    wanted = requirements_of(campaign).get("least_drive_margin", {})
-    for limit in [float(wanted[word]) for word in ("min", "max") if word in wanted]:
+    for _, limit in limits(campaign, "least_drive_margin"):
         axes.axvline(limit, color=style.VERMILLION, linewidth=1.3)
         axes.annotate(f"required {limit:g}", (limit, 1.0), rotation=0, ha="center", va="bottom",
                       color=style.VERMILLION, fontsize=9,
@@ -199,7 +186,10 @@ def _laid(grid: Array, angle: Array, margins: Array) -> Array:
 # Torque and speed of the motors over time, by ending.
 
 
-@style.styled
+@picture(
+    "campaign", 110, "Torque and speed of the motors over time, by ending",
+    ("motor_torque", "motor_speed"),
+)  # fmt: skip
 def motors(campaign: xr.Dataset) -> Figure:
     """A row a motor, from ``motor_torque`` and ``motor_speed`` (sample, plane, winch, time)."""
     names = ["motor_torque", "motor_speed", "final_time", "deployment_time"]
@@ -238,7 +228,10 @@ def peaks(campaign: xr.Dataset) -> xr.DataArray:
     return xr.concat(found, "sample")
 
 
-@style.styled
+@picture(
+    "campaign", 130, "Largest tension of each span along the cables",
+    ("cable_tension", "final_time", "deployment_time"),
+)  # fmt: skip
 def tension(campaign: xr.Dataset) -> Figure:
     """A panel a cable: median, 5-95 % and 0-100 % over the samples, from the winch on."""
     found = peaks(campaign)
@@ -264,8 +257,7 @@ def tension(campaign: xr.Dataset) -> Figure:
     grid[-1].set_xlabel(style.label(campaign["span"]))
     figure.supylabel(style.label(found.assign_attrs(long_name="largest recorded tension")),
                      fontsize=10.5)  # fmt: skip
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    legend(figure, [grid[0]], 4)
     counted = int(np.isfinite(found.to_numpy()).any(axis=(1, 2)).sum())
     head(
         figure,

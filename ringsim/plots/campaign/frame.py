@@ -1,5 +1,6 @@
 """Head, caption, names and colours that the figures of a campaign share."""
 
+import itertools
 import textwrap
 from collections.abc import Sequence
 
@@ -10,7 +11,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import QUANTILES
-from ringsim.analysis.design import population_of
+from ringsim.analysis.design import population_of, requirements_of
+from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.worst import losses
 from ringsim.plots import style
 
@@ -19,7 +21,7 @@ from ringsim.plots import style
 
 LOOKS = {
     "deployed": (style.BLUE, "o"),
-    "ok": (style.BLUE, "o"),
+    "unknown": (style.BLUE, "o"),
     "finished": (style.BLUE, "o"),
     "folded": (style.SKY, "o"),
     "not latched": ("#8c6d31", "P"),
@@ -31,6 +33,13 @@ LOOKS = {
 }
 """Colour and marker of an ending; the marker tells what the colour may not."""
 FAILED = tuple((style.INK, marker) for marker in "x+1234")
+
+
+def looks_of(words: NDArray[np.str_]) -> dict[str, tuple[str, str]]:
+    """Colour and marker of the endings that are there, by word, in their order."""
+    others = sorted(set(words.tolist()) - LOOKS.keys())
+    looks = LOOKS | dict(zip(others, itertools.cycle(FAILED), strict=False))
+    return {word: look for word, look in looks.items() if (words == word).any()}
 
 
 def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> None:
@@ -58,6 +67,12 @@ def standing(campaign: xr.Dataset) -> tuple[xr.Dataset, str]:
     return found, " Of blocks the samples A and B, which stand for the population." if left else ""
 
 
+def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
+    """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
+    wanted = read_requirements(requirements_of(campaign), "requirements")
+    return wanted[name].limits if name in wanted else []
+
+
 def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:
     """One legend for all panels, each word once: not every panel has all kinds of marks."""
     words = {
@@ -65,6 +80,7 @@ def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:
         for axes in panels
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
+    columns = max(1, min(columns, len(words)))
     figure.legend(words.values(), words.keys(), loc="outside lower center", ncols=columns)
 
 

@@ -1,6 +1,5 @@
 """Main numbers of all samples: distributions, convergence, by input, the tail."""
 
-import itertools
 import textwrap
 from collections.abc import Mapping
 from typing import Any
@@ -33,11 +32,22 @@ from ringsim.analysis.intervals import (
     ran,
     tells_of,
 )
+from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements, violations
 from ringsim.analysis.tails import approach, subset_simulation, tail
-from ringsim.analysis.verdicts import OUTCOME, Requirement, judge, read_requirements, violations
+from ringsim.analysis.verdicts import judge
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import FAILED, LOOKS, WIDE, head, in_lines, legend, standing
+from ringsim.plots.campaign.frame import (
+    WIDE,
+    head,
+    in_lines,
+    legend,
+    limits,
+    looks_of,
+    standing,
+)
+from ringsim.plots.campaign.tornado import is_one_by_one
+from ringsim.plots.registry import picture
 
 # Cumulative distribution of the main numbers, with the limits that the campaign sets them.
 
@@ -48,10 +58,14 @@ _STEPS = 2000
 """Steps of a curve at most: more than a figure resolves."""
 
 
-def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
-    """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
-    wanted = requirements_of(campaign).get(name, {})
-    return [(word, float(wanted[word])) for word in ("min", "max") if word in wanted]
+def reached(campaign: xr.Dataset) -> bool:
+    """Whether any level of a rare event has been reached."""
+    return any(len(places) for places, _ in approach(campaign))
+
+
+def _spread(campaign: xr.Dataset) -> bool:
+    """Whether main numbers are of samples that no other figure tells better."""
+    return bool(scalars(campaign)) and not reached(campaign) and not is_one_by_one(campaign)
 
 
 def points(values: Array, of: int) -> tuple[Array, Array]:
@@ -65,7 +79,9 @@ def points(values: Array, of: int) -> tuple[Array, Array]:
     return quantile(values, places[known].tolist()), np.array(_LEVELS)[known]
 
 
-@style.styled
+@picture(
+    "campaign", 30, "Cumulative distribution of each main number, with its limits", applies=_spread
+)
 def distributions(campaign: xr.Dataset) -> Figure:
     """Share of the samples at or below each value, a step a sample; dots at 5, 50 and 95 %.
 
@@ -125,6 +141,11 @@ _INTERVALS = 20
 """Points of the band: each costs a bootstrap."""
 
 
+def _converges(campaign: xr.Dataset) -> bool:
+    """Whether more samples make means and quantiles more certain."""
+    return bool(scalars(campaign)) and placement(campaign).population
+
+
 def _counts(samples: int, most: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(1, samples, min(most, samples)).astype(int))
 
@@ -180,7 +201,11 @@ def _required(campaign: xr.Dataset) -> Mapping[str, Requirement]:
     }  # fmt: skip
 
 
-@style.styled
+@picture(
+    "campaign", 100,
+    "Mean, 95 % quantile and probability of each requirement as samples come in",
+    applies=_converges,
+)  # fmt: skip
 def convergence(campaign: xr.Dataset) -> Figure:
     """A panel a number, then one a requirement, in the order of the samples.
 
@@ -240,6 +265,11 @@ _MANY = 500
 """Samples from which on marks are drawn as dots: as shapes they would make a page too large."""
 
 
+def _has_run(campaign: xr.Dataset) -> bool:
+    """Whether something became of drawn inputs."""
+    return bool(inputs(campaign)) and bool(ran(campaign).any())
+
+
 def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     """An input as one number a sample: the mean of its places, or the place of its word in the
     list that comes second, which is empty for numbers.
@@ -254,7 +284,7 @@ def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     return places.astype(float), words.tolist()
 
 
-@style.styled
+@picture("campaign", 80, "What became of each sample, by each drawn input", applies=_has_run)
 def by_input(campaign: xr.Dataset) -> Figure:
     """A panel an input: the main number of each sample that has run over the value drawn for it.
 
@@ -287,8 +317,7 @@ def by_input(campaign: xr.Dataset) -> Figure:
         axes.set_xlabel(_label(campaign[each]), fontsize=9, labelpad=15)
         if number % columns == 0 and name:
             axes.set_ylabel(style.label(campaign[name], width=30), fontsize=9)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)))
+    legend(figure, panels[:1], 4)
     lost = int((height == foot).sum())
     below = f"; {lost} without the number stand below the line" if lost else ""
     note = (
@@ -300,11 +329,8 @@ def by_input(campaign: xr.Dataset) -> Figure:
 
 
 def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
-    others = sorted(set(words.tolist()) - LOOKS.keys())
-    looks = LOOKS | dict(zip(others, itertools.cycle(FAILED), strict=False))
-    for word in filter(set(words.tolist()).__contains__, looks):
+    for word, (colour, marker) in looks_of(words).items():
         own = words == word
-        colour, marker = looks[word]
         axes.scatter(x[own], y[own], s=26, color=colour, marker=marker, alpha=0.8,
                      linewidths=1.2 if marker in "x+1234|" else 0.0,
                      label=f"{word} ({own.sum()})", zorder=3,
@@ -325,12 +351,9 @@ def _label(variable: xr.DataArray) -> str:
 # How a campaign of subset simulation came to its rare event.
 
 
-def reached(campaign: xr.Dataset) -> bool:
-    """Whether any level of a rare event has been reached."""
-    return any(len(places) for places, _ in approach(campaign))
-
-
-@style.styled
+@picture(
+    "campaign", 10, "Probability of what levels reached, up to the rare event", applies=reached
+)
 def rare_event(campaign: xr.Dataset) -> Figure:
     """Probability to be at or beyond the values that levels reached, a line a replicate; the
     event's own with its interval.
@@ -353,7 +376,6 @@ def rare_event(campaign: xr.Dataset) -> Figure:
     axes.set_yscale("log")
     axes.set_xlabel(style.label(campaign[design.of]))
     axes.set_ylabel("Probability of this or beyond")
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    legend(figure, [axes], 2)
     head(figure, campaign, "Rare event", f"{told(campaign, int(good(campaign).sum()))}.")
     return figure

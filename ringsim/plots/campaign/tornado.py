@@ -31,7 +31,8 @@ from ringsim.analysis.intervals import ran
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import FAILED, LOOKS, head, in_lines, legend
+from ringsim.plots.campaign.frame import head, in_lines, legend, looks_of
+from ringsim.plots.registry import picture
 
 # Which inputs matter for the main numbers: bars with intervals, the longest on top.
 
@@ -160,7 +161,9 @@ def explained(campaign: xr.Dataset) -> bool:
     return varied and bool(drawn(campaign).names) and subset_simulation(campaign) is None
 
 
-@style.styled
+@picture(
+    "campaign", 90, "Which inputs matter for each main number, with intervals", applies=explained
+)
 def tornado(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a bar an input or group; whiskers are intervals of 95 %."""
     # Those that something is required of first: a page has no room for all.
@@ -298,7 +301,7 @@ def _word(variable: xr.DataArray, value: object, base: object, place: int) -> st
     return f"{last} {', '.join(new) or value}"
 
 
-@style.styled
+@picture("campaign", 20, "Main numbers after each single change", applies=is_one_by_one)
 def one_by_one(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a mark a move in the order of the design; the line is the base case.
 
@@ -309,8 +312,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     samples, has_run = campaign["sample"].to_numpy(), ran(campaign)
     figure = Figure(figsize=(9.6, 1.75 * len(names) + 2.4))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    others = sorted(set(ends.tolist()) - LOOKS.keys())
-    looks = LOOKS | dict(zip(others, FAILED, strict=False))
+    looks = looks_of(ends)
     for axes, name in zip(panels, names, strict=True):
         known, values = values_of(campaign, name)
         at = np.searchsorted(samples, known)
@@ -324,7 +326,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
                 axes.plot(at[line], values[line], color=style.PALE, linewidth=1.0, zorder=1)
         for word in dict.fromkeys(ends[has_run].tolist()):
             own = ends[at] == word
-            colour, marker = looks.get(word, FAILED[0])
+            colour, marker = looks[word]
             axes.scatter(at[own], values[own], s=22, color=colour, marker=marker, zorder=3,
                          label=f"{word} ({(ends == word).sum()})")  # fmt: skip
         axes.ticklabel_format(axis="y", useOffset=False)
@@ -336,8 +338,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     names_shown = [textwrap.shorten(words[k], _WIDEST, placeholder=" ...") for k in places]
     panels[-1].set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
     panels[-1].set_xlim(-0.7, len(samples) - 0.3)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)))
+    legend(figure, [panels[0]], 4)
     counted = max(len(values_of(campaign, name)[0]) for name in names)
     head(
         figure, campaign, "One at a time",

@@ -1,0 +1,190 @@
+"""Requirements of a campaign: which values an antenna must keep to, how probably, how surely."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import xarray as xr
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
+
+from ringsim.analysis.intervals import Mask, good, numbers, quantities, tells_of
+from ringsim.outputs import VARIABLES
+from ringsim.outputs.balance import instead_of
+from ringsim.refusal import InputError, explain, known_or_nearest, show
+from ringsim.stepping.instant import Array
+from ringsim.units import Model
+from ringsim.variables import Fate
+
+OUTCOME = "outcome"
+_WORDS = [fate.word for fate in Fate if fate != Fate.NONE]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A way of keeping to a bound, which is a field of ``Requirement``."""
+
+    key: str
+    """What campaign files call it."""
+    sign: str
+    beyond: Callable[[Array, Any], Array]
+    """How far values are beyond a bound, shape (samples,): they violate it above 0."""
+    of_words: bool = False
+    """Whether the bound is a word, and the value the outcome."""
+
+
+KINDS = (
+    Kind("max", "<=", lambda values, bound: values - bound),
+    Kind("min", ">=", lambda values, bound: bound - values),
+    Kind("is", "is", lambda codes, word: 1.0 * (codes != Fate[word.upper()]), of_words=True),
+)
+"""A further one is a record here, and a field of ``Requirement``."""
+
+
+class Requirement(Model):
+    """What one output must be, with which probability, shown with which confidence."""
+
+    max: float | None = None
+    """Largest value allowed, in the output's unit."""
+    min: float | None = None
+    """Smallest value allowed, in the output's unit."""
+    is_: Annotated[str | None, Field(alias="is")] = None
+    """What the antenna must do; of the outcome alone."""
+    probability: Annotated[float, Field(gt=0.0, lt=1.0)]
+    """Share of all antennas, at least, that must keep to it."""
+    confidence: Annotated[float, Field(ge=0.5, lt=1.0)]
+    """Probability, at least, with which an antenna that does not keep to it is found out."""
+
+    @property
+    def given(self) -> list[tuple[Kind, Any]]:
+        """The bounds that it has, each with its kind."""
+        fields = {field.alias or name: name for name, field in type(self).model_fields.items()}
+        each = ((kind, getattr(self, fields[kind.key])) for kind in KINDS)
+        return [(kind, bound) for kind, bound in each if bound is not None]
+
+    @property
+    def limits(self) -> list[tuple[str, float]]:
+        """Bounds that are numbers by what files call them, the least first."""
+        known = [(kind.key, float(bound)) for kind, bound in self.given if not kind.of_words]
+        return sorted(known, key=lambda each: each[1])
+
+    def told(self, name: str) -> str:
+        """The requirement in words, with units."""
+        units = quantities()[name].units if name in quantities() else "1"
+        unit = "" if units == "1" else f" {units}"
+        return f"{name} " + " and ".join(
+            f"{kind.sign} {bound}" if kind.of_words else f"{kind.sign} {bound:g}{unit}"
+            for kind, bound in self.given
+        )
+
+    def beyond(self, values: Array) -> Array:
+        """How far values are beyond what is allowed, in their unit; NaN without a value."""
+        each = [kind.beyond(values, bound) for kind, bound in self.given]
+        return np.asarray(np.maximum.reduce(each))
+
+
+def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
+    """Refuse outputs that do not exist, and what their requirements cannot hold."""
+    known = [OUTCOME, *quantities()]
+    for name, each in requirements.items():
+        if name not in known:
+            why = f"is no output that can be required ({known_or_nearest(name, known)})"
+            if name in VARIABLES and VARIABLES[name].dims:
+                senses = {"max": "largest", "min": "least"}
+                asked = [senses[key] for key, _ in each.limits if key in senses]
+                raise ValueError(instead_of(name, *asked))
+            raise ValueError(f"{name} {why}")
+        if name == OUTCOME:
+            if each.is_ not in _WORDS or each.limits:
+                wrong = f"is = {show(each.is_)}" if each.is_ is not None else "is"
+                hint = known_or_nearest(str(each.is_), _WORDS)
+                raise ValueError(
+                    f'{name}.{wrong} must be a word for what the antenna does, as is = "deployed", '
+                    f"without max and min ({hint})"
+                )
+        elif each.is_ is not None:
+            raise ValueError(
+                f"{name}.is = {show(each.is_)}: only the outcome is a word: give max or min"
+            )
+        elif not each.given:
+            unit = "" if (u := quantities()[name].units) == "1" else f", in {u}"
+            raise ValueError(f"{name} needs a bound: give max or min{unit}")
+        elif each.max is not None and each.min is not None and each.min >= each.max:
+            raise ValueError(f"{name}.min = {each.min:g} must be below max = {each.max:g}")
+    return requirements
+
+
+Requirements = Annotated[dict[str, Requirement], AfterValidator(_check)]
+"""Requirement by name of the output."""
+
+
+class _Holder(Model):
+    requirements: Requirements
+
+
+def to_json(requirements: dict[str, Requirement]) -> str:
+    """The text that files hold."""
+    adapter = TypeAdapter(dict[str, Requirement])
+    return adapter.dump_json(requirements, by_alias=True, exclude_none=True).decode()
+
+
+def read_requirements(table: Mapping[str, Any], source: str) -> dict[str, Requirement]:
+    """Requirements from a plain table; an InputError begins with ``source``."""
+    try:
+        return _Holder.model_validate({"requirements": dict(table)}).requirements
+    except ValidationError as error:
+        raise InputError(explain(error, _Holder, source)) from None
+
+
+def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
+    """Requirements from texts of the command line.
+
+    >>> parse_requirements(["asynchrony_max: max 10, probability 0.99, confidence 0.9"])
+    {'asynchrony_max': Requirement(max=10.0, min=None, is_=None, probability=0.99, confidence=0.9)}
+    """
+    table: dict[str, dict[str, Any]] = {}
+    for text in texts:
+        name, found, rest = re.match(r"\s*(\w*)\s*([:=]?)(.*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
+        parts = [re.fullmatch(r"(\w+)[\s=]+(\S+)", part.strip()) for part in rest.split(",")]
+        if not name or not found or None in parts:
+            raise InputError(
+                f"--require {show(text)}: must read NAME: KEY VALUE, KEY VALUE, ..., for example "
+                '"asynchrony_max: max 10, probability 0.99, confidence 0.9" or "outcome: is '
+                'deployed, probability 0.99, confidence 0.9"'
+            )
+        if name in table:
+            raise InputError(f"--require {name} is given twice: leave out one of the two")
+        table[name] = {part[1]: _value(part[2]) for part in parts if part}
+    return read_requirements(table, "--require")
+
+
+def _value(word: str) -> Any:
+    try:
+        return float(word)
+    except ValueError:
+        return word.strip("\"'")
+
+
+def violations(campaign: xr.Dataset, name: str, wanted: Requirement) -> Mask:
+    """Which samples violate a requirement, of those that have numbers that hold.
+
+    One without a value violates it: an antenna that never deploys has no deployment time.
+    """
+    return np.asarray(good(campaign) & ~(wanted.beyond(numbers(campaign, name)) <= 0.0))
+
+
+def require_values(campaign: xr.Dataset, name: str) -> None:
+    """Refuse (InputError) an output that the runs do not compute: it would seem violated."""
+    if name not in campaign:
+        known = [OUTCOME, *(each for each in quantities() if each in campaign)]
+        raise InputError(
+            f"requirement on {name}: the file has no such output ({known_or_nearest(name, known)})"
+        )
+    none = np.flatnonzero(good(campaign) & ~tells_of(campaign, name))
+    if name != OUTCOME and len(none):
+        raise InputError(
+            f"requirement on {name}: {len(none)} samples reached their goal without a value of "
+            f"it, the first is {campaign['sample'].to_numpy()[none[0]]}: their model does not "
+            "compute it; require another output, or use the full fidelity"
+        )

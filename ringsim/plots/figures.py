@@ -1,0 +1,75 @@
+"""All figures that apply to a run or to a campaign, drawn and written."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ringsim.analysis.design import any_finite
+from ringsim.choice import load_package
+from ringsim.files import writing
+from ringsim.plots import style
+from ringsim.plots.registry import NO_JOINTS, Picture, jointed, known
+
+load_package("ringsim.plots")
+PICTURES = tuple(sorted(known.values(), key=lambda each: (each.of, each.place)))
+
+
+def figures_of(dataset: xr.Dataset) -> Iterator[tuple[Picture, Figure]]:
+    """Every figure for which a run, or the samples of a merged campaign, recorded something."""
+    read: dict[object, object] = {}
+    for each in PICTURES:
+        if not _recorded(dataset, each) or not each.applies(dataset):
+            continue
+        if each.read is not None and each.read not in read:
+            read[each.read] = each.read(dataset)
+        shared = [] if each.read is None else [read[each.read]]
+        yield each, each.draw(dataset, *shared)
+
+
+def _recorded(dataset: xr.Dataset, each: Picture) -> bool:
+    if each.of != ("campaign" if "sample" in dataset.dims else "run"):
+        return False
+    if not all(name in dataset for name in each.needs):
+        return False
+    if each.of == "run":
+        return all(bool(np.isfinite(dataset[name]).any()) for name in each.needs)
+    # Of a number that no run has reached the file still has the variable.
+    return all(any_finite(dataset, name) for name in each.needs[:1])
+
+
+def left_out(dataset: xr.Dataset) -> str:
+    """The figures that are not drawn although their numbers are recorded, and why; or nothing."""
+    names = [
+        each.name for each in PICTURES
+        if each.applies is jointed and _recorded(dataset, each) and not jointed(dataset)
+    ]  # fmt: skip
+    return f"not drawn: {', '.join(names)}: {NO_JOINTS}" if names else ""
+
+
+def draw_figures(
+    dataset: xr.Dataset, folder: str | Path, name: str = "run", formats: Sequence[str] = ("png",)
+) -> list[Path]:
+    """Write every figure of a run, finished or not, or of a merged campaign, as
+    NAME-fig-FIGURE.png.
+
+    ``folder`` is created if it does not exist; ``formats`` are any of png, svg and pdf.  Returns
+    the files written, none if nothing was recorded.
+
+    Raises
+    ------
+    InputError
+        If the folder or a file cannot be written.
+    """
+    folder, written = Path(folder), []
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    for each, figure in figures_of(dataset):
+        for kind in formats:
+            path = folder / f"{name}-fig-{each.name}.{kind}"
+            with writing(folder):
+                style.write(figure, path)
+            written.append(path)
+    return written
