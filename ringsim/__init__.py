@@ -42,8 +42,10 @@ def __getattr__(name: str) -> Any:
     """Load a public word on its first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    _register()
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    word = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    if "xarray" in sys.modules:  # which takes most of a second: not for a scene alone
+        _register()
+    return word
 
 
 def __dir__() -> list[str]:
@@ -55,5 +57,5 @@ def _register() -> None:
     importlib.import_module(f"{__name__}.analysis")
 
 
-if "xarray" in sys.modules:  # which takes most of a second; else with the first word that is used
+if "xarray" in sys.modules:
     _register()

@@ -39,10 +39,10 @@ def field_words(model: type[Model]) -> dict[str, str]:
 
 
 def _in_body(model: type[Model]) -> dict[str, str]:
-    """Docstrings in the body of one class; none where a session has typed it, without a file."""
+    """Docstrings in the body of one class; none of one without a file: typed, or run by ``runpy``."""
     try:
         source = inspect.getsource(model)
-    except OSError:
+    except (OSError, TypeError):
         return {}
     (body,) = ast.parse(textwrap.dedent(source)).body
     assert isinstance(body, ast.ClassDef)

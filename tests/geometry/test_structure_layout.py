@@ -170,6 +170,7 @@ class Bare(Structure):
     """One body on a support: no corners, no track."""
 
     kind: Literal["bare"] = "bare"
+    sections: int = 1
     swapped: bool = False
 
     def layout(self, scene: Any, coordinate: Any) -> Layout:
