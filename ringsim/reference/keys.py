@@ -39,7 +39,7 @@ def field_words(model: type[Model]) -> dict[str, str]:
 
 
 def _in_body(model: type[Model]) -> dict[str, str]:
-    """Docstrings in the body of one class; none of one without a file: typed, or run by ``runpy``."""
+    """Docstrings in the body of one class; none where it has no file: typed, or of ``runpy``."""
     try:
         source = inspect.getsource(model)
     except (OSError, TypeError):

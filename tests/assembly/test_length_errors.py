@@ -49,7 +49,9 @@ def axial_force(rod: Rod) -> float:
 
 def square(errors: list[float]) -> Layout:
     """A square of 1 m with both diagonals, six rods on pins: once statically indeterminate."""
-    scene = load_scene("truss2").with_values(dict.fromkeys(("boom", "net", "cables", "joints.vjoint"), "none"))
+    scene = load_scene("truss2").with_values(
+        dict.fromkeys(("boom", "net", "cables", "joints.vjoint"), "none")
+    )
     draft = Draft(scene.with_values({"loads": "none"}))
     still = 0j * STEP
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) + still
