@@ -22,7 +22,7 @@ from ringsim.build import digest_of
 
 VARIABLE = "NUMBA_CACHE_DIR"
 PACKING = "NUMBA_SLP_VECTORIZE"
-SOURCES = Path(__file__).parent / "frame"
+SOURCES = [Path(__file__).parent / room for room in ("compiled", "frame")]
 
 
 def choose_folder() -> Path:
@@ -53,8 +53,8 @@ def choose_folder() -> Path:
 
 
 def packs() -> bool:
-    """Whether rows of fronts are packed into registers (``ringsim.frame.vectors.packed``): unless
-    NUMBA_SLP_VECTORIZE is 0.
+    """Whether rows of fronts are packed into registers, by ``ringsim.compiled.vectors.packed``:
+    unless NUMBA_SLP_VECTORIZE is 0.
     """
     return os.environ.get(PACKING) != "0"
 
@@ -66,8 +66,9 @@ def compile_once(kind: Hashable, compiling: Callable[[], object]) -> None:
     to which numba ties its files; its ``repr`` is that of its content.
     """
     folder = choose_folder()
-    made = repr((version("numba"), sys.version, _sources(), str(SOURCES), packs(), kind)).encode()
-    mark = folder / f"compiled-{hashlib.blake2b(made, digest_size=12).hexdigest()}"
+    what = version("numba"), sys.version, _sources(), str(SOURCES[0]), packs(), kind
+    made = hashlib.blake2b(repr(what).encode(), digest_size=12).hexdigest()
+    mark = folder / f"compiled-{made}"
     if mark.exists():
         return
     with alone():
@@ -124,7 +125,7 @@ def _why_not(folder: Path) -> str:
 
 def _sources() -> str:
     """Of what is compiled: numba looks at a function's own file, not at those that it calls."""
-    return digest_of(SOURCES.glob("*.py"))
+    return digest_of(file for room in SOURCES for file in room.glob("*.py"))
 
 
 def _processor() -> str:

@@ -69,8 +69,15 @@ def run(
 
 
 def prepare_run(scene: Scene) -> None:
-    """Load what ``run`` needs, so that the time of the first run is that of a run."""
+    """Load what ``run`` needs, so that the time of the first run is that of a run; the chain of
+    cables is compiled once a machine.
+    """
     import ringsim.exudyn.integrate  # noqa: F401
+
+    if scene.cables is not None:
+        from ringsim.compiled.chain import try_chain
+
+        compile_once("chain", try_chain)
 
 
 def run_frame(

@@ -90,19 +90,16 @@ class Ropes:
         """Which pulleys the rope slips over, shape (pulleys,)."""
         return np.asarray((self.of_pulley == rope) & (self.slips > 0.0))
 
-    def measured(self, points: Array, velocities: Array) -> tuple[Array, Array, Array]:
-        """Lengths (m), unit vectors away from the winch and rates of length (m/s) of all spans.
-
-        Points and velocities are those of all cables, m and m/s, shape (points, 3).  ValueError if
-        a span has no length.
-        """
-        apart = points[self.near + 1] - points[self.near]
-        lengths = np.sqrt(np.einsum("ij,ij->i", apart, apart))
-        if not lengths.min() > SHORTEST:
-            raise ValueError(self._no_length(lengths))
-        units = apart / lengths[:, None]
-        moving = velocities[self.near + 1] - velocities[self.near]
-        return lengths, units, np.einsum("ij,ij->i", units, moving)
+    def require_length(self, lengths: Array) -> None:
+        """Raise a ValueError if a span, of these lengths (m), has none."""
+        if lengths.min() > SHORTEST:
+            return
+        if not np.all(np.isfinite(lengths)):
+            raise ValueError("the points of the cables are not finite")
+        span = int(np.argmin(lengths))
+        cable = self.cable[self.of_span[span]]
+        number = span - self.cable_starts[cable] + 1
+        raise ValueError(f"cable {cable + 1}: span {number} has no length, its two points coincide")
 
     def along(self, spans: Array) -> Array:
         """Sums over the spans of each rope; (spans,) -> (ropes,)."""
@@ -151,14 +148,6 @@ class Ropes:
         alive[self.of_span[self._span(cable, span, 1, "span")]] = False
         return replace(self, alive=alive)
 
-    def _no_length(self, lengths: Array) -> str:
-        if not np.all(np.isfinite(lengths)):
-            return "the points of the cables are not finite"
-        span = int(np.argmin(lengths))
-        cable = self.cable[self.of_span[span]]
-        number = span - self.cable_starts[cable] + 1
-        return f"cable {cable + 1}: span {number} has no length, its two points coincide"
-
     def _span(self, cable: int, place: int, fewer: int, what: str) -> int:
         """The span at a place of a cable, among all cables'."""
         cables = len(self.points_per_cable)
@@ -201,11 +190,6 @@ def tension(force: Array, width: Array) -> Array:
     array([0.    , 0.0347, 1.    ])
     """
     return np.asarray(width * np.logaddexp(0.0, np.maximum(force / width, _SLACKEST)))
-
-
-def slope(force: Array, width: Array) -> Array:
-    """q'(y), between 0 (slack) and 1 (taut)."""
-    return np.asarray(0.5 + 0.5 * np.tanh(0.5 * force / width))
 
 
 def energy(force: Array, width: Array) -> Array:

@@ -6,10 +6,11 @@ import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.cable.chain import Chain, ChainState, RopeTangent, decay_tangent, rope_tangent
+from ringsim.cable.chain import ChainState
 from ringsim.cable.records import Cables
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import Winches
+from ringsim.compiled.chain import PASSING, Chain
 from ringsim.exudyn.assembly import Array, Assembly, Indices
 from ringsim.exudyn.cable_path import CablePath, Placed
 from ringsim.stepping.locks import Turning
@@ -34,9 +35,8 @@ class JacobianPattern:
     ``unknowns`` the number of auxiliary ones.
     """
 
-    steady = 0.9999
-    """Share of the full friction from which its changes with the rope's speed do not matter: the
-    decay of a rope above it over all its pulleys is left out."""
+    passing = PASSING
+    """Slopes of pulleys' friction over those at rest below which Newton does without them."""
     negligible = 0.02
     """Decay entries are left out below this share of the largest geometric stiffness T / L.
     Newton needs one iteration more at most (tests/cable_engine/test_newton.py)."""
@@ -86,6 +86,7 @@ class JacobianPattern:
 
     def triplets(
         self,
+        chain: Chain,
         state: ChainState,
         placed: Placed,
         by_q: float,
@@ -102,15 +103,17 @@ class JacobianPattern:
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         turned = maps.transpose(0, 2, 1)
         directions = np.empty((len(self._tensions), 3, 3))
-        shares = np.broadcast_to(left, len(state.natural))
-        parts: list[Array] = []
-        for rope in range(len(state.natural)):
-            tangent = rope_tangent(state, placed.velocities, rope)
-            directions[tangent.spans] = tangent.by_direction
-            parts += self._rope(state, tangent, rope, by_q, by_rate, slopes, float(shares[rope]))
+        unit = state.directions
+        across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
+        directions = (state.tensions / state.lengths)[:, None, None] * across
+        shares = np.broadcast_to(left, len(state.natural)).astype(float)
+        factors = chain.changes(
+            state, placed.velocities, slopes, shares, by_q, by_rate, self.passing
+        )
+        parts = [part for each in factors for part in self._rope(state, *each, by_q)]
         blocks = [
             -maps,
-            turned @ state.directions[self._span, :, None],
+            turned @ unit[self._span, :, None],
             turned @ directions[self._span],
             *(-block for block in self._path.turning(placed, state.point_forces)),
         ]
@@ -126,27 +129,19 @@ class JacobianPattern:
         return entries
 
     def _rope(
-        self,
-        state: ChainState,
-        tangent: RopeTangent,
-        rope: int,
-        by_q: float,
-        by_rate: float,
-        slopes: Array,
-        left: float,
+        self, state: ChainState, rope: int, pulls: Array, changes: Array, by_q: float
     ) -> list[Array]:
         """How a rope's span tensions follow its mean tension and the differences of its points."""
-        spans, mean = tangent.spans, self._means[rope : rope + 1, None]
-        tension, difference = self._tensions[spans, None], self._differences[spans].reshape(1, -1)
-        mean_values = by_q * left * tangent.mean_by_place + by_rate * tangent.mean_by_velocity
+        spans = slice(int(state.ropes.starts[rope]), int(state.ropes.ends[rope]))
+        mean, tension = self._means[rope : rope + 1, None], self._tensions[spans, None]
+        difference = self._differences[spans].reshape(1, -1)
         entries = [
-            _entries(tension, mean, -by_q * state.shares[spans]),
-            _entries(mean, difference, -mean_values),
+            _entries(tension, mean, -by_q * pulls[0]),
+            _entries(mean, difference, -changes[0]),
         ]
-        if np.all((slopes * state.slip_speeds)[state.ropes.inner(rope)] < 1.0 - self.steady**2):
+        if len(pulls) == 1:
             return entries
-        by_place, by_velocity = decay_tangent(state, tangent, rope, slopes)
-        flat = (by_q * by_place + by_rate * by_velocity).reshape(len(tension), -1)
+        flat = pulls[1:].T @ changes[1:].reshape(len(pulls) - 1, -1)
         stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
         row, column = np.nonzero(np.abs(flat) > by_q * self.negligible * max(stiffest, 1.0))
         decay = [tension[row, 0], difference[0, column], -flat[row, column]]
@@ -232,8 +227,7 @@ class CableDrive:
         placed, ropes = self.path.place(coordinates, rates), self.ropes
         path = path_rate = None
         if self.winches.answering:
-            lengths, _, moving = ropes.measured(placed.points, placed.velocities)
-            path, path_rate = ropes.along(lengths), ropes.along(moving)
+            path, path_rate = self.chain.paths(ropes, placed.points, placed.velocities)
         wound, wound_rate = self.winches.at(time, ropes, path, path_rate)
         state = self.chain.state(ropes, placed.points, placed.velocities, wound, wound_rate)
         return state, placed
@@ -295,7 +289,9 @@ class CableDrive:
                 slopes = self._turning.slopes(
                     self.ropes, state.speeds, own, lambda speed: np.tanh(speed / slip)
                 )
-                triplets = self.pattern.triplets(state, placed, by_q, by_rate, slopes, left)
+                triplets = self.pattern.triplets(
+                    self.chain, state, placed, by_q, by_rate, slopes, left
+                )
         except ValueError as error:
             self.refusal = str(error)
             triplets = self.pattern.empty()

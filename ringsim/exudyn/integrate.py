@@ -14,22 +14,15 @@ from ringsim.exudyn.assembly import STIFFENING, Predictor
 from ringsim.exudyn.build import Built, build
 from ringsim.exudyn.laws import AngleForces
 from ringsim.exudyn.meters import (
-    AccelerationMeter,
-    BaseMeter,
-    BendingMeter,
     EnergyMeter,
-    NetMeter,
-    PositionMeter,
-    ShapeMeter,
-    StressMeter,
+    Readings,
 )
 from ringsim.exudyn.model import Openings, State, joint_groups
 from ringsim.layout.layout import Layout
-from ringsim.outputs.family import Reading
+from ringsim.outputs.meters import Reading
 from ringsim.outputs.recorder import Recorder
 from ringsim.rigid.statics import residual_tolerance, rope_reach, scales_of
 from ringsim.scene import Scene
-from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.run import Run
 from ringsim.variables import Cause, Outcome, Reason
@@ -171,25 +164,12 @@ class Integration(Run):
         self._now = State(model)
         self._openings = Openings(model)
         self._energy = EnergyMeter(built)
-        self._stress = StressMeter(model) if scene.record.stress else None
-        self._base = BaseMeter(built) if scene.record.reactions else None
-        self._shock = AccelerationMeter(model) if scene.record.accelerations else None
-        gauge = scene.structure.gauge
-        self._bending = BendingMeter(model, gauge) if gauge else None
-        self._position = PositionMeter(model) if scene.record.positions else None
-        shaped = scene.record.shape or strained(scene)
-        self._shape = ShapeMeter(model) if shaped else None
-        self._net = NetMeter.of(model)
-        coordinates = {"rod": np.array(list(model.layout.halves()))}
-        for meter in (self._position, self._shock, self._shape):
-            coordinates |= {} if meter is None else meter.coordinates
-        if self._bending is not None:
-            coordinates["station"] = self._bending.stations
+        self._readings = Readings(built, self._now)
         self._gaps = joint_groups(model)
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
-        self.history = Recorder(scene, coordinates)
+        self.history = Recorder(scene, self._readings.coordinates())
         ropes = None if built.cables is None else built.cables.ropes.content
         self._set_out(
             self._measured(0.0),
@@ -303,19 +283,7 @@ class Integration(Run):
 
     def _reading(self, now: Instant) -> Reading:
         """See ``Run``."""
-        state, cables = self._now, self._built.cables
-        return Reading(
-            **vars(now),
-            chain=self._chain,
-            planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
-            stress=None if self._stress is None else self._stress.read(state),
-            places=None if self._position is None else self._position.read(state),
-            strain=None if self._bending is None else self._bending.read(state),
-            carried=None if self._base is None else self._base.read(now),
-            accelerations=None if self._shock is None else self._shock.read(),
-            put=None if self._shape is None else self._shape.read(state),
-            net=None if self._net is None else self._net.read(state),
-        )
+        return self._readings.reading(now, self._chain, self._cables)
 
     def _measured(self, time: float) -> Instant:
         """See ``Run``: the state that was refreshed last."""

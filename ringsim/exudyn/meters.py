@@ -2,23 +2,23 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Self
+from functools import cached_property
 
 import exudyn as exu
 import numpy as np
 
 from ringsim.cable.chain import ChainState, work_between
-from ringsim.exudyn.assembly import Array, axes_of, cross, spin
+from ringsim.exudyn.assembly import Array, Indices, axes_of, cross, spin
 from ringsim.exudyn.build import Built
 from ringsim.exudyn.cable_path import Direction
 from ringsim.exudyn.model import Multibody, State
 from ringsim.exudyn.rods import Ancf, beam_section
 from ringsim.layout.bodies import InSpace, OnBody
 from ringsim.layout.points import points_of
-from ringsim.outputs.family import Carried, Put
-from ringsim.parts.laws import PairLaw
+from ringsim.outputs.meters import Bodies, Meters, Places
+from ringsim.parts.laws import Switches
 from ringsim.rigid.statics import body_reaction, first_reaction
-from ringsim.stepping.instant import Energies, Instant, Passing, lost_between
+from ringsim.stepping.instant import Energies, Passing, lost_between
 
 # Force and moment in the middle of beam elements, by their formulation.
 #
@@ -97,7 +97,7 @@ def _unit(vectors: Array, along: Array) -> tuple[Array, Array]:
     return direction.unit, np.einsum("nij,nj->ni", direction.first(), along)
 
 
-# What is read of every state of a run: energies and their balance, stress and bending strain.
+# Energies of every state, and their balance.
 
 
 class EnergyMeter:
@@ -185,120 +185,7 @@ class EnergyMeter:
         return unknown if self._untold else ""
 
 
-class StressMeter:
-    """Stress |N| / A + |M| r / I of every rod half: the larger of its two ends.
-
-    Elements have the elastic moment in their middle, the rods' dampers add what damping carries
-    there; along it the moment follows the shear force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
-    """
-
-    def __init__(self, model: Multibody) -> None:
-        self._assembly = model.assembly
-        rows = [*model.layout.halves().values()]
-        self._shape = len(rows), len(rows[0]), 2
-        places, numbers = [], []
-        for half in (half for row in rows for half in row):
-            part = model.layout.rods[half.rod]
-            per_moment = 0.5 * part.tube.outer_diameter / part.tube.second_moment
-            for k, end in ((half.first, -0.5), (half.last - 1, 0.5)):
-                places.append((half.rod, k))
-                numbers.append((end * part.lengths[k], part.tube.area, per_moment))
-        # Places of the outer ends from the elements' middles (m); by what force is divided (m^2)
-        # and moment multiplied (1/m^3) to give stress.
-        self._outside, self._area, self._per_moment = np.array(numbers).T
-        # All elements have a damper each, in their order, or none has.
-        dampers = {int(e): k for k, e in enumerate(e for rod in model.rods for e in rod.elements)}
-        damped = model.scene.rods.damping > 0.0
-        elements = [model.rods[rod].elements[k] for rod, k in places]
-        self._damped = [dampers[int(e)] for e in elements] if damped else None
-        self._carried = section_forces(model, places)
-
-    def read(self, state: State) -> Array:
-        """Stresses at the current state, shape (rod halves, sections), Pa."""
-        force, torque = self._carried(state)
-        if self._damped is not None:
-            carried = self._assembly.dampers.latest.forces[self._damped].T
-            force, torque = force + carried[:3], torque + carried[3:]
-        x = self._outside
-        moment = np.hypot(torque[1] + force[2] * x, torque[2] - force[1] * x)
-        stress = np.abs(force[0]) / self._area + moment * self._per_moment
-        return np.asarray(stress.reshape(self._shape).max(axis=2))
-
-
-class BendingMeter:
-    """Bending strain of a rod's outer fibre at its nodes, on the side of its y axis's negative.
-
-    Where two elements meet their moments differ by what turns the node alone; their mean counts.
-    ``stations`` are the nodes' distances from the rod's first end, m.
-    """
-
-    def __init__(self, model: Multibody, name: str) -> None:
-        number = next(k for k, rod in enumerate(model.layout.rods) if rod.name == name)
-        rod = model.layout.rods[number]
-        self._lengths = rod.lengths
-        self.stations = np.array(rod.stations) * rod.length
-        self._carried = section_forces(model, [(number, k) for k in range(len(rod.lengths))])
-        self._per_moment = (
-            0.5 * rod.tube.outer_diameter / (rod.young_modulus * rod.tube.second_moment)
-        )
-
-    def read(self, state: State) -> Array:
-        """Strains at the current state, shape (nodes,)."""
-        force, torque = self._carried(state)
-        change = 0.5 * force[1] * self._lengths
-        first, last = torque[2] + change, torque[2] - change
-        at_nodes = np.concatenate([first[:1], 0.5 * (first[1:] + last[:-1]), last[-1:]])
-        return np.asarray(-self._per_moment * at_nodes)
-
-
-# What the base carries and how it turns.
-
-
-class BaseMeter:
-    """Reads the base of a model: what exudyn's clamp of the ground carries, and of a spacecraft
-    what accelerates it.
-    """
-
-    def __init__(self, built: Built) -> None:
-        model, layout = built.model, built.model.layout
-        self._system, self._layout, self._angles = model.assembly.system, layout, built.angles
-        self._first = first_reaction(layout, model.moving)
-        self._node = None if layout.base is None else model.bodies[layout.base][1]
-        clamps = [j.holder for j in model.joints if isinstance(j.part.first, InSpace)]
-        self._clamp = clamps[0] if clamps else None
-
-    def read(self, now: Instant) -> Carried:
-        """At the current state."""
-        torques = self._angles.switches.torques("stop", np.pi - now.angles, -now.rates)
-        return Carried(self._reaction(), self._turn(), torques)
-
-    def _reaction(self) -> Array | None:
-        """Shape (2, 3), N and N m; None of a base that floats alone."""
-        first, self._first = self._first, None
-        if first is not None:  # the clamp has not been solved for yet
-            return first
-        if self._clamp is not None:
-            found = [self._system.GetObjectOutput(self._clamp, kind) for kind in _CLAMP]
-            return np.asarray(_SENSES * found)
-        craft = self._layout.spacecraft
-        if craft is None or self._layout.base is None:
-            return None
-        kinds = _KIND.Acceleration, _KIND.AngularAcceleration, _KIND.AngularVelocity
-        moving, *turning = map(self._output, kinds)
-        gravity = np.zeros(3) if self._layout.gravity is None else self._layout.gravity
-        return body_reaction(craft, self._axes(), moving - gravity, *turning)
-
-    def _turn(self) -> Array | None:
-        """Rotation matrix since the start; None without a base."""
-        if self._layout.base is None:
-            return None
-        return np.asarray(self._axes() @ self._layout.bodies[self._layout.base].pose.axes.T)
-
-    def _axes(self) -> Array:
-        return self._output(_KIND.RotationMatrix).reshape(3, 3)
-
-    def _output(self, kind: Any) -> Array:
-        return np.asarray(self._system.GetNodeOutput(self._node, kind))
+# What outputs read of a state, in exudyn.
 
 
 _CLAMP = _KIND.ForceLocal, _KIND.TorqueLocal
@@ -308,15 +195,96 @@ _SENSES = np.array([[-1.0, -1.0, -1.0], [-1.0, 1.0, 1.0]])
 rates of which are w_x, -w_y and -w_z of the body."""
 
 
-# Places and velocities of a structure's points in exudyn.
+class Readings(Meters):
+    """Measures the current state of a model, at what has been read of it."""
 
+    def __init__(self, built: Built, state: State) -> None:
+        model = built.model
+        super().__init__(model.scene, model.layout)
+        self._model, self._state, self._angles = model, state, built.angles
+        self._system, size = model.assembly.system, model.assembly.coordinates_of
+        self._nodes = np.array([size(node) for _, node in model.bodies])
+        clamps = [j.holder for j in model.joints if isinstance(j.part.first, InSpace)]
+        self._clamp = clamps[0] if clamps else None
+        # All elements have a damper each, in their order, or none has.
+        elements = (int(element) for rod in model.rods for element in rod.elements)
+        damped = model.scene.rods.damping > 0.0
+        self._dampers = {e: k for k, e in enumerate(elements)} if damped else {}
+        self._known: dict[Places, tuple[SectionForces, list[int]]] = {}
+        self._solved = False
 
-class PositionMeter:
-    """Reads points on nodes, and those beside the nodes of bodies."""
+    @property
+    def switches(self) -> Switches:
+        """Those of the model."""
+        return self._angles.switches
 
-    def __init__(self, model: Multibody) -> None:
-        points = points_of(model.layout, model.scene.structure.planes)
-        self.coordinates = points.coordinates
+    def bodies(self) -> Bodies:
+        """From their nodes' Euler parameters."""
+        places, rates = (x[self._nodes] for x in (self._state.position, self._state.velocity))
+        return Bodies(places[:, :3], rates[:, :3], axes_of(places[:, 3:7]))
+
+    def accelerations(self) -> Array:
+        """Of the nodes; exudyn's solver takes the initial ones over in its first step."""
+        data, kind = self._system.systemData, exu.ConfigurationType
+        found = data.GetODE2Coordinates_tt(kind.Current if data.GetTime() > 0.0 else kind.Initial)
+        return np.asarray(np.asarray(found, dtype=float)[self._nodes[:, :3]])
+
+    def points(self) -> Array:
+        """On nodes, and beside the nodes of bodies."""
+        where, aside, arms, turning = self._points
+        state = self._state
+        found = np.stack([state.position[where], state.velocity[where]], axis=1)
+        if aside:
+            turns = state.position[turning]
+            reach = np.einsum("nij,nj->ni", axes_of(turns), arms)
+            spins = spin(turns, state.velocity[turning])
+            found[aside] += np.stack([reach, cross(spins, reach)], axis=1)
+        return found
+
+    def section_forces(self, places: Places, *, damped: bool) -> tuple[Array, Array]:
+        """As exudyn tells them, and what the rods' dampers carry."""
+        if places not in self._known:
+            elements = [int(self._model.rods[rod].elements[k]) for rod, k in places]
+            dampers = [self._dampers[element] for element in elements] if self._dampers else []
+            self._known[places] = section_forces(self._model, places), dampers
+        read, dampers = self._known[places]
+        force, torque = read(self._state)
+        if damped and dampers:
+            carried = self._model.assembly.dampers.latest.forces[dampers].T
+            return force + carried[:3], torque + carried[3:]
+        return force, torque
+
+    def rod_energy(self) -> float:
+        """The elements' own."""
+        output = self._system.GetObjectOutputBody
+        elements = (element for rod in self._model.rods for element in rod.elements)
+        return sum(float(output(element, _KIND.PotentialEnergy)) for element in elements)
+
+    def reaction(self) -> Array | None:
+        """What exudyn's clamp of the ground carries, and of a spacecraft what accelerates it."""
+        layout = self.layout
+        if not self._solved:  # the clamp has not been solved for yet
+            self._solved = True
+            if (first := first_reaction(layout, self._model.moving)) is not None:
+                return first
+        if self._clamp is not None:
+            found = [self._system.GetObjectOutput(self._clamp, kind) for kind in _CLAMP]
+            return np.asarray(_SENSES * found)
+        craft, base = layout.spacecraft, layout.base
+        if craft is None or base is None:
+            return None
+        node = self._model.bodies[base][1]
+        moving, *turning = (
+            np.asarray(self._system.GetNodeOutput(node, kind))
+            for kind in (_KIND.Acceleration, _KIND.AngularAcceleration, _KIND.AngularVelocity)
+        )
+        gravity = np.zeros(3) if layout.gravity is None else layout.gravity
+        return body_reaction(craft, self.bodies().axes[base], moving - gravity, *turning)
+
+    @cached_property
+    def _points(self) -> tuple[Indices, list[int], Array, Indices]:
+        """Coordinates of all points; which stand aside of their nodes, their arms and turns."""
+        model, points = self._model, points_of(self.layout, self.scene.structure.planes)
         nodes, arms = [], []
         for where in points.mounts:
             node, arm = (
@@ -325,86 +293,8 @@ class PositionMeter:
             )  # fmt: skip
             nodes.append(model.assembly.coordinates_of(node))
             arms.append(arm)
-        assert all(len(nodes[k]) == 7 for k, arm in enumerate(arms) if arm.any())
-        self._where = np.array([own[:3] for own in nodes])
-        self._aside = [k for k, arm in enumerate(arms) if arm.any()]
-        self._arms = np.array([arms[k] for k in self._aside]).reshape(-1, 3)
-        turns = [nodes[k][3:7] for k in self._aside]
-        self._turns = np.array(turns, dtype=np.int64).reshape(-1, 4)
-        assert all(isinstance(points.mounts[k], OnBody) for k in self._aside)
-
-    def read(self, state: State) -> Array:
-        """Places (m) and velocities (m/s), shape (points, 2, 3)."""
-        found = np.stack([state.position[self._where], state.velocity[self._where]], axis=1)
-        if self._aside:
-            turns = state.position[self._turns]
-            arms = np.einsum("nij,nj->ni", axes_of(turns), self._arms)
-            spins = spin(turns, state.velocity[self._turns])
-            found[self._aside] += np.stack([arms, cross(spins, arms)], axis=1)
-        return found
-
-
-# Where corners are and what the rods store, in exudyn.
-
-
-class ShapeMeter:
-    """Reads corners and the elastic energy of the rods."""
-
-    def __init__(self, model: Multibody) -> None:
-        corners, size = model.layout.corners, model.assembly.coordinates_of
-        self._where = np.array([[size(model.bodies[k][1])[:3] for k in plane] for plane in corners])
-        self.coordinates = {"corner": np.arange(1, self._where.shape[1] + 1)}
-        self._elements = [element for rod in model.rods for element in rod.elements]
-        self._output = model.assembly.system.GetObjectOutputBody
-
-    def read(self, state: State) -> Put:
-        """At the current state."""
-        kind = exu.OutputVariableType.PotentialEnergy
-        energy = sum(float(self._output(element, kind)) for element in self._elements)
-        return Put(state.position[self._where], energy)
-
-
-# Accelerations of corners in exudyn.
-
-
-class AccelerationMeter:
-    """Reads the nodes of corners."""
-
-    def __init__(self, model: Multibody) -> None:
-        corners, size = model.layout.corners, model.assembly.coordinates_of
-        self.coordinates = {"corner": np.arange(1, len(corners[0]) + 1)}
-        self._where = np.array([[size(model.bodies[k][1])[:3] for k in plane] for plane in corners])
-        self._data = model.assembly.system.systemData
-        # exudyn's solver takes the initial ones over in its first step.
-        self._next = exu.ConfigurationType.Initial
-
-    def read(self) -> Array:
-        """Shape (planes, corners, 3), m/s^2, at the current state."""
-        found = self._data.GetODE2Coordinates_tt(self._next)
-        self._next = exu.ConfigurationType.Current
-        return np.asarray(np.asarray(found, dtype=float)[self._where])
-
-
-# Tension of a net's cables in exudyn.
-
-
-class NetMeter:
-    """Reads the nodes of all bodies for a law that tells of each of its pairs."""
-
-    def __init__(self, model: Multibody, law: PairLaw) -> None:
-        openings = model.layout.openings
-        self._law, self._shape = law, (len(openings), len(openings[0]))
-        self._where = np.array(
-            [model.assembly.coordinates_of(node)[:3] for _, node in model.bodies]
-        )
-
-    @classmethod
-    def of(cls, model: Multibody) -> Self | None:
-        """None without such a law."""
-        told = [law for law in model.layout.pair_laws if law.places]
-        return cls(model, told[0]) if told else None
-
-    def read(self, state: State) -> Array:
-        """Shape (planes, sections), N; NaN in planes without."""
-        both = state.position[self._where], state.velocity[self._where]
-        return self._law.tensions(*both, self._shape)
+        aside = [k for k, arm in enumerate(arms) if arm.any()]
+        assert all(isinstance(points.mounts[k], OnBody) for k in aside)
+        turns = np.array([nodes[k][3:7] for k in aside], dtype=np.int64).reshape(-1, 4)
+        reach = np.array([arms[k] for k in aside]).reshape(-1, 3)
+        return np.array([own[:3] for own in nodes]), aside, reach, turns

@@ -7,33 +7,31 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsim.cable.chain import Chain, ChainState
-from ringsim.cable.friction import PulleyFriction, Pulleys
+from ringsim.cable.chain import ChainState
+from ringsim.cable.friction import (
+    LEAST_TENSION,
+    MOST_SOLVED,
+    SOLVED,
+    PulleyFriction,
+    Pulleys,
+)
 from ringsim.cable.records import BlockSheave, Cables, Sheave
 from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winches import Winches
-from ringsim.frame.elimination import Border
-from ringsim.frame.kernels import Pose, push
-from ringsim.frame.laws import Tape, play, taped
-from ringsim.frame.mesh import Indices, Mesh, Parts, Skeleton
-from ringsim.frame.ropes import (
-    BY_ANGLE,
-    BY_SPEED,
-    DECAY,
-    PASSING,
+from ringsim.compiled.chain import (
+    Chain,
     Drums,
-    Laws,
     RopeTable,
     Spans,
-    border,
     factors_needed,
     felt_slopes,
     measure,
-    of_ropes,
-    pull_tight,
-    show,
+    slide,
+    tension_changes,
+    tighten,
+    with_law_slopes,
 )
-from ringsim.frame.vectors import (
+from ringsim.compiled.vectors import (
     compiled,
     cross,
     dot,
@@ -46,6 +44,10 @@ from ringsim.frame.vectors import (
     turned_about_z,
     vector,
 )
+from ringsim.frame.elimination import Border
+from ringsim.frame.kernels import Pose, push
+from ringsim.frame.laws import Tape, play, taped
+from ringsim.frame.mesh import Indices, Mesh, Parts, Skeleton
 from ringsim.layout.bodies import Array
 from ringsim.stepping.locks import Turning
 
@@ -241,6 +243,82 @@ def add_line_tangent(lines: Lines, arms: Arms, spans: Spans, fronts: Array) -> N
                         )
 
 
+# Laws of the pulleys' friction, as recorded operations.
+
+
+class Laws(NamedTuple):
+    """What friction laws say of pulleys: ln(eta), and its derivatives after angle and speed; and
+    whether any depends on the speed of the rope, or on its tension.
+    """
+
+    decays: Tape
+    slopes: Tape
+    moves: bool
+    loads: bool
+
+
+DECAY, BY_ANGLE, BY_SPEED = 3, 3, 4
+"""Rows of the results of ``decays`` and of ``slopes``, behind what laws see."""
+
+
+@compiled
+def pull_tight(
+    table: RopeTable, behind: Indices, drums: Drums, laws: Laws, places: Array, rates: Array,
+    spans: Spans,
+) -> float:  # fmt: skip
+    """Spans, with their tensions, at places and rates of the points; returns the least length, NaN
+    if no tensions go with the friction (``ringsim.cable.chain``).
+    """
+    least, rows = measure(table, behind, places, rates, spans), laws.decays.rows
+    slide(table, drums, spans)
+    show(behind, spans, laws.decays)
+    if not laws.loads:
+        play(laws.decays)
+        tighten(table, drums, rows[DECAY], spans)
+        return least
+    rows[DECAY] = 0.0
+    tighten(table, drums, rows[DECAY], spans)
+    before = np.zeros(len(behind))
+    for _ in range(MOST_SOLVED):
+        show(behind, spans, laws.decays)
+        play(laws.decays)
+        tighten(table, drums, rows[DECAY], spans)
+        change = 0.0
+        for j in range(len(behind)):
+            change = max(change, abs(rows[DECAY, j] - before[j]))
+            before[j] = rows[DECAY, j]
+        if change < SOLVED:
+            return least
+    return math.nan
+
+
+@compiled
+def show(behind: Indices, spans: Spans, tape: Tape) -> None:
+    """Let laws see the pulleys (``ringsim.cable.friction.Pulleys``)."""
+    for j in range(len(behind)):
+        both = 0.5 * (spans.tension[behind[j] - 1] + spans.tension[behind[j]])
+        tape.rows[0, j], tape.rows[1, j] = spans.angle[j], abs(spans.speed[j])
+        tape.rows[2, j] = max(both, LEAST_TENSION)
+
+
+@compiled
+def spread_changes(
+    table: RopeTable, spans: Spans, pulls: Array, changes: Array, out: Array
+) -> None:
+    """Changes of tension in factors as pulls on all points, and what they change with after places
+    of all points, (2, k, points, 3), from those of spans; see ``tension_changes``.
+    """
+    for row in range(len(pulls)):
+        for i in range(len(spans.length)):
+            near = table.near[i]
+            for c in range(3):
+                pull = pulls[row, i] * spans.unit[i, c]
+                out[0, row, near, c] -= pull
+                out[0, row, near + 1, c] += pull
+                out[1, row, near, c] -= changes[row, i, c]
+                out[1, row, near + 1, c] += changes[row, i, c]
+
+
 # What cables do to the residual and its tangent, in one call each: numba takes longer to receive
 # these tables than to go through them.
 
@@ -272,10 +350,13 @@ def add_cables(
     change of path that stretches each rope, ``rate_by_place`` the derivative of rates after places
     (1/s), ``factors`` zeros, shape (2, k, points, 3).
     """
-    border(
+    count, n = factors.shape[1], len(spans.length)
+    pulls, changes = np.zeros((count, n)), np.zeros((count, n, 3))
+    tension_changes(
         table, drums, laws.decays.rows[DECAY], laws.slopes.rows[BY_ANGLE], slopes, spans, rates,
-        left, rate_by_place, factors,
+        left, 1.0, rate_by_place, pulls, changes,
     )  # fmt: skip
+    spread_changes(table, spans, pulls, changes, factors)
     add_line_tangent(lines, arms, spans, fronts)
     pull_lines(lines, mesh, arms, factors[0], columns, first)
     pull_lines(lines, mesh, arms, factors[1], rows, first)
@@ -345,35 +426,8 @@ class FrameCables:
         ropes, spans, turned = self.ropes, self._spans, self._turned
         least = pull_tight(self._table, ropes.behind, self._drums, self._laws, places, rates, spans)
         self._require(least, places, rates)
-        paths, path_rates, strains, strain_rates, forces, means = of_ropes(
-            self._table, self._drums, spans
-        )
-        angles = spans.angle.copy()
-        return ChainState(
-            ropes=ropes,
-            material=self._chain.material[:, ropes.cable],
-            lengths=spans.length.copy(),
-            rates=spans.rate.copy(),
-            directions=spans.unit.copy(),
-            angles=angles,
-            log_decays=self._laws.decays.rows[DECAY].copy(),
-            friction=self._chain.friction,
-            speeds=spans.speed.copy(),
-            exponents=spans.exponent.copy(),
-            slip_speeds=self._chain.slip_speed,
-            shares=spans.share.copy(),
-            tensions=spans.tension.copy(),
-            paths=paths,
-            path_rates=path_rates,
-            natural=self._drums.natural,
-            wound_rates=self._drums.winding,
-            strains=strains,
-            strain_rates=strain_rates,
-            forces=forces,
-            mean_tensions=means,
-            wound=turned.wound,
-            wound_rate=turned.rate,
-        )
+        log_decays = self._laws.decays.rows[DECAY].copy()
+        return self._chain.read(ropes, self._table, self._drums, spans, log_decays, *turned)
 
     def go_on(
         self, ropes: Ropes, places: Array, rates: Array, wound: Array, speed: Array
@@ -431,12 +485,9 @@ class FrameCables:
 
     def _wind(self, wound: Array, rate: Array) -> None:
         """Let the winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
-        ropes = self.ropes
-        inflow = np.zeros(len(ropes.starts))
-        inflow[ropes.of_end[:, 1]] = -rate[:, 1]
-        natural = ropes.content - ropes.per_rope(wound)
-        self._drums = Drums(natural, ropes.per_rope(rate), inflow)
-        self._enough, self._turned = bool(natural.min() > 0.0), _Turned(wound, rate)
+        self._drums = self._chain.drums(self.ropes, wound, rate)
+        self._enough = bool(self._drums.natural.min() > 0.0)
+        self._turned = _Turned(wound, rate)
 
     def factors(self, time: float) -> int:
         """Number of factors in which tensions change in the state of the last ``pull``."""
@@ -452,10 +503,8 @@ class FrameCables:
         show(self.ropes.behind, spans, self._laws.slopes)
         play(self._laws.slopes)
         if self._laws.moves:
-            by_speed = self._laws.slopes.rows[BY_SPEED]
-            decays = np.minimum(self._laws.decays.rows[DECAY], -1e-300)
-            more = np.abs(spans.exponent) * by_speed / decays
-            self._slopes = self._slopes + np.where(np.abs(more) * slip > PASSING, more, 0.0)
+            by_speed, decays = self._laws.slopes.rows[BY_SPEED], self._laws.decays.rows[DECAY]
+            self._slopes = with_law_slopes(self._slopes, spans.exponent, by_speed, decays, slip)
         return factors_needed(self._table, self._slopes)
 
     def add_tangent(
@@ -478,8 +527,7 @@ class FrameCables:
         )  # fmt: skip
 
     def _retable(self) -> None:
-        chain = self._chain
-        self._table = RopeTable.of(self.ropes, chain.material, chain.slip_speed, self.lines.span)
+        self._table = self._chain.table(self.ropes, self.lines.span)
         self._spans = Spans.empty(self.ropes)
         self._turned_at = math.nan
 

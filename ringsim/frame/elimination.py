@@ -6,8 +6,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
+from ringsim.compiled.vectors import packed, unsigned
 from ringsim.frame.mesh import Indices, Mesh
-from ringsim.frame.vectors import packed, unsigned
 from ringsim.layout.bodies import Array
 
 # Eight numbers of a row at a time, as tuples: one register of a modern processor, or two.

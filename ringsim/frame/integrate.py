@@ -16,7 +16,7 @@ from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter, Readings
 from ringsim.frame.state import State
 from ringsim.layout.bodies import Array
-from ringsim.outputs.family import Reading
+from ringsim.outputs.meters import Reading
 from ringsim.outputs.recorder import Recorder, States, StoredState, cleared, struck_by
 from ringsim.parts.faults import Fault, Struck
 from ringsim.parts.laws import Place, Switches
@@ -119,7 +119,7 @@ class Integration(Run):
         self._steps: list[tuple[float, Array]] = []
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._readings = Readings(model)
-        self.history = Recorder(scene, self._readings.coordinates)
+        self.history = Recorder(scene, self._readings.coordinates())
         ropes = None if model.cables is None else model.cables.ropes.content
         self._set_out(
             self._measure(0.0, self._now),
@@ -260,7 +260,8 @@ class Integration(Run):
 
     def _reading(self, now: Instant) -> Reading:
         """See ``Run``."""
-        return self._readings.read(now, self._now, self._strains)
+        meters = self._readings.at(self._now, self._strains)
+        return meters.reading(now, self._at, self._cables)
 
     def _measured(self, time: float) -> Instant:
         """See ``Run``."""

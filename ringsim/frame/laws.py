@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from ringsim.compiled.vectors import compiled
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh, Skeleton
-from ringsim.frame.vectors import compiled
 from ringsim.layout.bodies import Array, JointOpening
 from ringsim.parts.joints import JointFriction
 from ringsim.parts.laws import AngleLaw, Reaction, Rub, Switches

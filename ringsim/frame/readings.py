@@ -1,54 +1,139 @@
 """What outputs read of a state, as far as the scene records it."""
 
+from contextlib import suppress
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 
 from ringsim.cable.chain import ChainState, work_between
-from ringsim.frame.kernels import Strains, StressMeter, energies_of
-from ringsim.frame.mesh import Mesh
+from ringsim.frame.kernels import Strains, energies_of
+from ringsim.frame.mesh import Indices, Mesh
 from ringsim.frame.model import FrameModel
 from ringsim.frame.springs import passing_pairs
 from ringsim.frame.state import State
 from ringsim.layout.bodies import Array, OnBody, OnRod
 from ringsim.layout.points import BOOM_TIP, HUB, Where, points_of
-from ringsim.outputs.family import Carried, Put, Reading
-from ringsim.parts.laws import PairLaw
+from ringsim.outputs.meters import Bodies, Meters, Places
+from ringsim.parts.laws import Switches
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import first_reaction
-from ringsim.scene.substituted import strained
-from ringsim.stepping.instant import Energies, Instant, Passing, Remembering, lost_between
+from ringsim.stepping.instant import Energies, Passing, Remembering, lost_between
 
-# Places and velocities of a structure's points in joint coordinates.
+# What outputs read of a state, in joint coordinates.
 
 
 _CLOSE = 1e-9
 """How far a point may be off those with mass of its body, m."""
 
 
-class PositionMeter:
-    """Reads points as means of the points with mass, whose rates are followed.
+class Readings(Meters):
+    """Measures states of a model.
 
-    A point of a rigid body is the same mean of four others of it wherever it moves.
+    The rates that are followed are those of points with mass: a point of a rigid body is the same
+    mean of four others of it wherever it moves.
     """
 
-    def __init__(self, model: FrameModel) -> None:
-        points = points_of(model.layout, model.scene.structure.planes)
-        self.coordinates = points.coordinates
-        self._mesh, rods = model.mesh, model.layout.rods
-        self._first = np.cumsum([0, *(len(rod.lengths) for rod in rods)])
-        self._weights = np.zeros((len(points.mounts), len(model.mesh.point_mass)))
-        self._hub = points.names.index(HUB) if HUB in points.names else None
-        for row, where in zip(self._weights, points.mounts, strict=True):
-            self._weigh(row, where)
+    _state: State
+    _strains: Strains
 
-    def read(self, state: State) -> Array:
-        """Places (m) and velocities (m/s), shape (points, 2, 3)."""
-        both = state.place, state.rate
-        found = np.stack([self._weights @ each.points for each in both], axis=1)
-        if self._hub is not None:
-            found[self._hub] = [each.hub[0] for each in both]
+    def __init__(self, model: FrameModel) -> None:
+        super().__init__(model.scene, model.layout)
+        self._model, self._mesh, rods = model, model.mesh, model.layout.rods
+        self._first = np.cumsum([0, *(len(rod.lengths) for rod in rods)])
+        self._stiffness: Array = model.mesh.stiffness[: self._first[-1]]  # behind: the boom
+        self._known: dict[Places, Indices] = {}
+        self._balanced = False
+        if model.scene.record.accelerations:
+            for number in np.ravel(model.layout.corners):
+                weights_of(model.mesh, OnBody(int(number)))  # may refuse
+
+    def at(self, state: State, strains: Strains) -> Self:
+        """Measure this state, with its strains, from now on."""
+        self._state, self._strains = state, strains
+        return self
+
+    @property
+    def switches(self) -> Switches:
+        """Those of the model."""
+        return self._model.laws.switches
+
+    def bodies(self) -> Bodies:
+        """The first frames; velocities are NaN of bodies without mass around their origins, unless
+        strings pull them.
+        """
+        state, count = self._state, len(self.layout.bodies)
+        velocities = self._of_bodies @ state.rate.points
+        velocities[self._model.web.ends] = state.rate.ends
+        return Bodies(state.pose.place[:count], velocities, state.pose.axes[:count])
+
+    def accelerations(self) -> Array:
+        """Those of points with mass, in the same means."""
+        return np.asarray(self._of_bodies @ self._state.acceleration.points)
+
+    def points(self) -> Array:
+        """Means of points with mass; the hub is followed itself."""
+        places = self._state.place, self._state.rate
+        weights, hub = self._of_points
+        found = np.stack([weights @ each.points for each in places], axis=1)
+        if hub is not None:
+            found[hub] = [each.hub[0] for each in places]
         return found
+
+    def section_forces(self, places: Places, *, damped: bool) -> tuple[Array, Array]:
+        """From the strains of elements."""
+        own, mesh, strains = self._elements(places), self._mesh, self._strains
+        now, before = strains.now[own], strains.before[own]
+        felt = now
+        if damped:
+            felt = now + mesh.tau[own, None] * (strains.lead * now + before)
+        carried = mesh.stiffness[own] * felt
+        return carried[:, :3].T, carried[:, 3:].T
+
+    def rod_energy(self) -> float:
+        """From the strains."""
+        strains = self._state.strains[: len(self._stiffness)]
+        return 0.5 * float(np.sum(self._stiffness * strains**2))
+
+    def reaction(self) -> Array | None:
+        """The ground's is what is out of balance on the unknowns that it holds, a spacecraft's the
+        inertia of its points.
+        """
+        model, state = self._model, self._state
+        if not self._balanced:  # nothing has been out of balance yet
+            self._balanced = True
+            return first_reaction(self.layout, model.moving)
+        if self.layout.supports:
+            return model.reaction.reshape(2, 3)
+        own, craft = model.mesh.craft, self.layout.spacecraft
+        if craft is None or not len(own):
+            return None
+        pulled = 0.25 * craft.mass * (state.acceleration.points[own] - model.gravity)
+        arms = state.place.points[own] - state.pose.place[self.layout.base]
+        return -np.array([pulled.sum(axis=0), np.cross(arms, pulled).sum(axis=0)])
+
+    def _elements(self, places: Places) -> Indices:
+        if places not in self._known:
+            self._known[places] = np.array([self._first[rod] + k for rod, k in places])
+        return self._known[places]
+
+    @cached_property
+    def _of_bodies(self) -> Array:
+        """Shares of all points with mass in the origins of bodies, shape (bodies, points)."""
+        found = np.full((len(self.layout.bodies), len(self._mesh.point_mass)), np.nan)
+        for number, row in enumerate(found):
+            with suppress(InputError):
+                row[:] = weights_of(self._mesh, OnBody(number))
+        return found
+
+    @cached_property
+    def _of_points(self) -> tuple[Array, int | None]:
+        """Shares in the points of a layout, shape (points, points with mass); which is the hub."""
+        points = points_of(self.layout, self.scene.structure.planes)
+        found = np.zeros((len(points.mounts), len(self._mesh.point_mass)))
+        for row, where in zip(found, points.mounts, strict=True):
+            self._weigh(row, where)
+        return found, points.names.index(HUB) if HUB in points.names else None
 
     def _weigh(self, row: Array, where: Where) -> None:
         mesh = self._mesh
@@ -82,144 +167,6 @@ def weights_of(mesh: Mesh, where: OnBody) -> Array:
             '"full"'
         )
     return row
-
-
-# Accelerations of corners in joint coordinates.
-
-
-class AccelerationMeter:
-    """Reads the origins of corners as means of the points with mass of their bodies."""
-
-    def __init__(self, model: FrameModel) -> None:
-        corners = model.layout.corners
-        self.coordinates = {"corner": np.arange(1, len(corners[0]) + 1)}
-        self._weights = np.array(
-            [[weights_of(model.mesh, OnBody(body)) for body in plane] for plane in corners]
-        )
-
-    def read(self, state: State) -> Array:
-        """Shape (planes, corners, 3), m/s^2."""
-        return np.asarray(self._weights @ state.acceleration.points)
-
-
-# What the base carries and how it turns.
-
-
-class BaseMeter:
-    """Reads the base of a model.
-
-    The ground's reaction is what is out of balance on the unknowns that it holds; a spacecraft's
-    is the inertia of its points.
-    """
-
-    def __init__(self, model: FrameModel) -> None:
-        self._model, self._base = model, model.layout.base
-        self._first = first_reaction(model.layout, model.moving)
-        craft = model.layout.spacecraft
-        self._mass = 0.0 if craft is None else 0.25 * craft.mass
-
-    def read(self, state: State) -> Carried:
-        """At a state."""
-        torques = self._model.laws.stop_torques(state.pose.angle, state.rate.angles)
-        return Carried(self._reaction(state), self._turn(state), torques)
-
-    def _reaction(self, state: State) -> Array | None:
-        """Shape (2, 3), N and N m; None of a base that floats alone."""
-        first, self._first = self._first, None
-        if first is not None:  # nothing has been out of balance yet
-            return first
-        if self._model.layout.supports:
-            return self._model.reaction.reshape(2, 3)
-        own = self._model.mesh.craft
-        if not len(own):
-            return None
-        pulled = self._mass * (state.acceleration.points[own] - self._model.gravity)
-        arms = state.place.points[own] - state.pose.place[self._base]
-        return -np.array([pulled.sum(axis=0), np.cross(arms, pulled).sum(axis=0)])
-
-    def _turn(self, state: State) -> Array | None:
-        """Rotation matrix since the start; None without a base."""
-        if self._base is None:
-            return None
-        start = self._model.layout.bodies[self._base].pose.axes
-        return np.asarray(state.pose.axes[self._base] @ start.T)
-
-
-# Where corners are and what the rods store, in joint coordinates.
-
-
-class ShapeMeter:
-    """Reads corners and the elastic energy of the rods."""
-
-    def __init__(self, model: FrameModel) -> None:
-        self._corners = np.array(model.layout.corners)
-        self.coordinates = {"corner": np.arange(1, self._corners.shape[1] + 1)}
-        rods = sum(len(rod.lengths) for rod in model.layout.rods)
-        self._stiffness: Array = model.mesh.stiffness[:rods]  # behind them stands the boom
-
-    def read(self, state: State) -> Put:
-        """At a state whose strains are known."""
-        strains = state.strains[: len(self._stiffness)]
-        energy = 0.5 * float(np.sum(self._stiffness * strains**2))
-        return Put(state.pose.place[self._corners], energy)
-
-
-# Tension of a net's cables in joint coordinates.
-
-
-class NetMeter:
-    """Reads the ends of a law that tells of each of its pairs."""
-
-    def __init__(self, model: FrameModel, law: PairLaw) -> None:
-        self._model, self._law = model, law
-        self._shape = model.openings.angle.shape
-
-    @classmethod
-    def of(cls, model: FrameModel) -> Self | None:
-        """None without such a law."""
-        told = [law for law in model.layout.pair_laws if law.places]
-        return cls(model, told[0]) if told else None
-
-    def read(self, state: State) -> Array:
-        """Shape (planes, sections), N; NaN in planes without."""
-        velocities = np.zeros((len(self._model.layout.bodies), 3))
-        velocities[self._model.web.ends] = state.rate.ends
-        return self._law.tensions(state.pose.place, velocities, self._shape)
-
-
-# What outputs read of a state, as far as the scene records it.
-
-
-class Readings:
-    """All meters that a model's scene asks for; ``coordinates`` are those of what they read."""
-
-    def __init__(self, model: FrameModel) -> None:
-        self._model, record = model, model.scene.record
-        shaped = record.shape or strained(model.scene)
-        self._stress = StressMeter(model.mesh, model.layout) if record.stress else None
-        self._position = PositionMeter(model) if record.positions else None
-        self._base = BaseMeter(model) if record.reactions else None
-        self._shock = AccelerationMeter(model) if record.accelerations else None
-        self._shape = ShapeMeter(model) if shaped else None
-        self._net = NetMeter.of(model)
-        self.coordinates = {"rod": np.array(list(model.layout.halves()))}
-        for meter in (self._position, self._shock, self._shape):
-            self.coordinates |= {} if meter is None else meter.coordinates
-
-    def read(self, now: Instant, state: State, strains: Strains) -> Reading:
-        """An instant with what there is to tell of its state."""
-        cables = self._model.cables
-        return Reading(
-            **vars(now),
-            chain=state.chain,
-            planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
-            stress=None if self._stress is None else self._stress.read(strains),
-            places=None if self._position is None else self._position.read(state),
-            carried=None if self._base is None else self._base.read(state),
-            accelerations=None if self._shock is None else self._shock.read(state),
-            put=None if self._shape is None else self._shape.read(state),
-            net=None if self._net is None else self._net.read(state),
-        )
 
 
 # Energies of a state, and what has passed since the state that was kept last.

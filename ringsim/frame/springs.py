@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.compiled.vectors import compiled, cross, dot, minus, times, vector
 from ringsim.frame.kernels import Pose
 from ringsim.frame.laws import Law, Tape, play, taped
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
-from ringsim.frame.vectors import compiled, cross, dot, minus, times, vector
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.layout import Layout
 from ringsim.parts.laws import HUB as FREE

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.cable.chain import ChainState
+from ringsim.compiled.vectors import compiled
 from ringsim.frame.cables import Arms, Lines, place_lines
 from ringsim.frame.kernels import Pose, Strains, add_forces, begin_tangent, place_points
 from ringsim.frame.laws import Acting, add_joint_slopes, push_joints
 from ringsim.frame.mesh import Indices, Mesh
 from ringsim.frame.springs import Web, add_pairs, aside, pull_pairs
-from ringsim.frame.vectors import compiled
 from ringsim.layout.bodies import Array
 from ringsim.layout.layout import Hung
 from ringsim.parts.ground import Hold

@@ -38,7 +38,7 @@ class BaseReaction(Output):
 
     def read(self, now: Reading) -> Array | None:
         """Shape (2, 3), N and N m."""
-        return None if now.carried is None else now.carried.reaction
+        return now.meters.reaction()
 
     def reduce(self, run: Run, series: Series) -> Values:
         """On the output grid; the peaks are those of all steps."""
@@ -72,7 +72,7 @@ class BaseRotation(Output):
         """Shape (3,), rad."""
         from scipy.spatial.transform import Rotation  # here: most runs have no such base
 
-        turn = None if now.carried is None else now.carried.turn
+        turn = now.meters.turn()
         return None if turn is None else np.asarray(Rotation.from_matrix(turn).as_rotvec())
 
     def reduce(self, run: Run, series: Series) -> Values:

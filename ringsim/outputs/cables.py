@@ -95,9 +95,9 @@ class NetTension(Output):
         *PEAK_OF_NET.variables,
     )  # fmt: skip
 
-    def read(self, now: Reading) -> Array | None:
+    def read(self, now: Reading) -> Array:
         """Shape (planes, sections), N."""
-        return now.net
+        return now.meters.net()
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated, and the largest reading."""

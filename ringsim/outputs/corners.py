@@ -40,9 +40,9 @@ class PeakAcceleration(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Reading) -> Array | None:
+    def read(self, now: Reading) -> Array:
         """Shape (planes, corners, 3), m/s^2."""
-        return now.accelerations
+        return now.meters.corners(now.meters.accelerations())
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of all steps."""
@@ -72,9 +72,9 @@ class Position(Output):
         ),
     )
 
-    def read(self, now: Reading) -> Array | None:
+    def read(self, now: Reading) -> Array:
         """Places (m) and velocities (m/s), shape (points, 2, 3)."""
-        return now.places
+        return now.meters.points()
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated with the velocities: between two steps rods turn, and their ends go round
@@ -108,9 +108,9 @@ class Shape(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Reading) -> Array | None:
+    def read(self, now: Reading) -> Array:
         """Places of the corners, shape (planes, corners, 3), m."""
-        return None if now.put is None else now.put.corners
+        return now.meters.corners(now.meters.bodies().places)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of the last state."""
@@ -151,9 +151,9 @@ class Prestress(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Reading) -> float | None:
+    def read(self, now: Reading) -> float:
         """In J."""
-        return None if now.put is None else now.put.rods
+        return now.meters.rod_energy()
 
     def reduce(self, run: Run, series: Series) -> Values:
         """On the output grid, and the first."""

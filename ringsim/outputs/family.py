@@ -4,83 +4,27 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.cable.chain import ChainState
 from ringsim.cable.records import Cable
 from ringsim.cable.winding import MotorWinding
 from ringsim.choice import kind_of
 from ringsim.hermite import cubic, monotone_slopes
+from ringsim.outputs.meters import Reading
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
-from ringsim.stepping.instant import Array, Instant
+from ringsim.stepping.instant import Array
 from ringsim.stepping.locks import history
 from ringsim.variables import ErrorBar, Variable
 
-# What outputs read of a state, the readings over time, and a run that has ended.
+# Readings over time, and a run that has ended.
 
 
 _SAME = 1.0 + 1e-12
 """Times that differ by round-off alone are the same."""
-
-
-class Carried(NamedTuple):
-    """What base and stops carry.
-
-    Force (N) and torque (N m) of the base on the structure, shape (2, 3), about the base's origin,
-    None of a base that floats alone; rotation matrix of the base since the start, None without a
-    base; torque of the stop on every V-joint, shape (planes, sections), N m, None without stops.
-    """
-
-    reaction: Array | None
-    turn: Array | None
-    stops: Array | None
-
-
-class Put(NamedTuple):
-    """Places of the corners, shape (planes, corners, 3), m, and elastic energy of the rods, J."""
-
-    corners: Array
-    rods: float
-
-
-@dataclass(frozen=True)
-class Reading(Instant):
-    """An instant with all that outputs read; to them its energies tell ``work`` with what the
-    winches put in, and ``lost``, since the start.
-    """
-
-    chain: ChainState | None = None
-    """All cables; None if the scene has none."""
-    planes: tuple[tuple[int, ...], ...] = ()
-    """Planes of each cable of the chain: one may stand for two cables that pull alike."""
-    stress: Array | None = None
-    """Axial + bending stress, shape (rod halves, sections), Pa; None unless recorded."""
-    places: Array | None = None
-    """Places (m) and velocities (m/s) of the structure's points, shape (points, 2, 3); None unless
-    recorded."""
-    strain: Array | None = None
-    """Bending strain at the stations of the rod with the gauge, if the structure has one."""
-
-    carried: Carried | None = None
-    """What base and stops carry; None unless recorded."""
-    accelerations: Array | None = None
-    """Of the corners, shape (planes, corners, 3), m/s^2; None unless recorded."""
-
-    put: Put | None = None
-    """Where corners are and what the rods store; None unless recorded."""
-    net: Array | None = None
-    """Tension of the cables along a net's edge, shape (planes, sections), N; None without."""
-
-    def by_plane(self, of_cables: NDArray[Any]) -> Array:
-        """A number for each plane, from one for each cable; NaN where a plane has no cable."""
-        found = np.full(len(self.angles), np.nan)
-        for planes, value in zip(self.planes, of_cables, strict=True):
-            found[list(planes)] = value
-        return found
 
 
 @dataclass(frozen=True)

@@ -301,7 +301,7 @@ class LockImpulse(Output):
 
     def read(self, now: Reading) -> Array | None:
         """Shape (planes, sections), N m."""
-        return None if now.carried is None else now.carried.stops
+        return now.stop_torques()
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Trapezoids over the steps, which resolve a bounce."""

@@ -41,9 +41,9 @@ class RodStress(Output):
         *PEAK.variables,
     )  # fmt: skip
 
-    def read(self, now: Reading) -> Array | None:
+    def read(self, now: Reading) -> Array:
         """Shape (rod halves, sections), Pa."""
-        return now.stress
+        return now.meters.stress()
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated, and the largest reading."""
@@ -72,6 +72,6 @@ class BendingStrain(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Reading) -> Array | None:
+    def read(self, now: Reading) -> Array:
         """Shape (stations,)."""
-        return now.strain
+        return now.meters.strain()

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringsim.cable.chain import Chain
 from ringsim.cable.friction import (
     BearingFriction,
     CapstanFriction,
@@ -15,6 +14,7 @@ from ringsim.cable.friction import (
 )
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winding import ConstantWinding
+from ringsim.compiled.chain import Chain
 
 RADIUS = 0.01
 LAWS = {

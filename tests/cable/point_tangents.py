@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringsim.cable.chain import decay_tangent, rope_tangent
-
 
 @dataclass
 class PointTangent:
@@ -30,30 +28,42 @@ def differences_of(count):
     return np.kron(single, np.eye(3))
 
 
-def tangents(state, velocities):
-    """F = -D^T f with f_i = T_i u_i, rope by rope."""
+def tangents(chain, state, velocities):
+    """F = -D^T f with f_i = T_i u_i, rope by rope: d(T_i u_i) = u_i dT_i + T_i du_i."""
+    ropes, left = state.ropes, np.ones(len(state.natural))
+    by_place, by_rate = (
+        {
+            rope: (pulls, changes)
+            for rope, pulls, changes in chain.changes(
+                state, velocities, state.exponent_slopes, left, *by, passing=0.0
+            )
+        }
+        for by in ((1.0, 0.0), (0.0, 1.0))
+    )
     found = []
-    for rope in range(len(state.natural)):
-        tangent = rope_tangent(state, velocities, rope)
-        decay, drag = decay_tangent(state, tangent, rope, state.exponent_slopes)
-        share, unit = state.shares[tangent.spans], state.directions[tangent.spans]
-        count, apart = len(unit), differences_of(len(unit))
+    for rope, (first, last) in enumerate(zip(ropes.starts, ropes.ends, strict=True)):
+        unit, count = state.directions[first:last], last - first
+        apart = differences_of(count)
 
-        def on_points(by_difference, unit=unit, apart=apart, count=count):
+        def on_points(factors, unit=unit, apart=apart, count=count):
+            by_difference = np.einsum("kn,kmi->nmi", *factors)
             pull = unit[:, :, None, None] * by_difference[:, None]
             return -apart.T @ pull.reshape(3 * count, 3 * count) @ apart
 
-        by_direction = np.zeros((count, 3, count, 3))
-        by_direction[range(count), :, range(count)] = tangent.by_direction
-        weight = share[:, None, None]
-        first = int(state.ropes.near[tangent.spans.start])
+        across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
+        turned = np.zeros((count, 3, count, 3))
+        held = state.tensions[first:last] / state.lengths[first:last]
+        turned[range(count), :, range(count)] = held[:, None, None] * across
+        none = np.zeros((1, count)), np.zeros((1, count, 3))
+        place, rate = by_place.get(rope, none), by_rate.get(rope, none)
+        near = int(ropes.near[first])
         found.append(
             PointTangent(
-                points=slice(first, first + count + 1),
-                material=on_points(weight * tangent.mean_by_place),
-                decay=on_points(decay),
-                geometric=-apart.T @ by_direction.reshape(3 * count, 3 * count) @ apart,
-                damping=on_points(weight * tangent.mean_by_velocity + drag),
+                points=slice(near, near + count + 1),
+                material=on_points([each[:1] for each in place]),
+                decay=on_points([each[1:] for each in place]),
+                geometric=-apart.T @ turned.reshape(3 * count, 3 * count) @ apart,
+                damping=on_points(rate),
             )
         )
     return found

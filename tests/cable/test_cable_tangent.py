@@ -21,7 +21,7 @@ MATERIAL = {"axial_stiffness": 1e4, "slack_width": 0.5, "damping_time": 0.003}
 def assembled(case, state):
     size = case.points.size
     stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
-    for tangent in tangents(state, case.velocities):
+    for tangent in tangents(case.chain, state, case.velocities):
         own = slice(3 * tangent.points.start, 3 * tangent.points.stop)
         stiffness[own, own] += tangent.stiffness
         damping[own, own] += tangent.damping
@@ -72,7 +72,7 @@ def test_tangents_are_the_derivatives_of_the_forces(law, stretch):
 def test_a_translation_of_the_whole_cable_changes_no_force():
     case = random_case(4, wound=0.01, winding=0.3, friction=LAWS["bearing"], **MATERIAL)
     state = case.state()
-    for k, tangent in enumerate(tangents(state, case.velocities)):
+    for k, tangent in enumerate(tangents(case.chain, state, case.velocities)):
         shift = np.tile(np.eye(3), (state.ropes.points_per_cable[k], 1))
         for part in (tangent.material, tangent.decay, tangent.geometric, tangent.damping):
             assert np.abs(part).max() > 0.0
@@ -83,7 +83,7 @@ def test_the_material_part_at_rest_is_the_stated_rank_one_matrix():
     path = [[0, 0, 0], [1, 0, 0], [1.5, 0.6, 0], [2, 0, 0.4], [3, 0, 0]]
     case = still(path, 0.02, (1.0, 0.0), friction=LAWS["capstan"], axial_stiffness=1e4)
     state = case.state()
-    (tangent,) = tangents(state, case.velocities)
+    (tangent,) = tangents(case.chain, state, case.velocities)
     gradients = np.zeros((4, 5, 3))
     spans = np.arange(4)
     gradients[spans, spans + 1] = state.directions
@@ -98,7 +98,7 @@ def test_the_material_part_at_rest_is_the_stated_rank_one_matrix():
 
 def test_without_friction_the_tangent_is_symmetric_and_resists():
     case = random_case(2, wound=0.01, speed=0.0, axial_stiffness=1e4)
-    for tangent in tangents(case.state(), case.velocities):
+    for tangent in tangents(case.chain, case.state(), case.velocities):
         largest = np.abs(tangent.stiffness).max()
         assert tangent.stiffness == pytest.approx(tangent.stiffness.T, abs=1e-12 * largest)
         assert np.linalg.eigvalsh(tangent.stiffness).max() < 1e-10 * largest
@@ -107,9 +107,9 @@ def test_without_friction_the_tangent_is_symmetric_and_resists():
 def test_a_cut_rope_has_no_tangent_and_a_straight_one_a_finite_one():
     points = np.outer(np.arange(5), [0.3, 0.4, 0.1])
     case = still(points, 0.001, friction=LAWS["bearing"])
-    (tangent,) = tangents(case.state(), case.velocities)
+    (tangent,) = tangents(case.chain, case.state(), case.velocities)
     assert np.all(np.isfinite(tangent.stiffness))
     case.ropes = case.ropes.cut(0, 2)
-    (tangent,) = tangents(case.state(), case.velocities)
+    (tangent,) = tangents(case.chain, case.state(), case.velocities)
     assert np.all(tangent.stiffness == 0.0)
     assert np.all(tangent.damping == 0.0)

@@ -8,11 +8,11 @@ from pydantic import TypeAdapter
 
 from cable_cases import RADIUS, cable
 from ringsim.cable import friction
-from ringsim.cable.chain import Chain
 from ringsim.cable.friction import BearingFriction
 from ringsim.cable.records import AnyWinding, Winch
 from ringsim.cable.winding import ConstantWinding, PrescribedWinding, Winding
 from ringsim.choice import kinds_of
+from ringsim.compiled.chain import Chain
 
 pytestmark = pytest.mark.quick
 

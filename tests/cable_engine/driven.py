@@ -57,7 +57,7 @@ def axis_of(turn: Array) -> Array:
 
 def write_all(drive: CableDrive) -> None:
     """Let the cables write all entries of their Jacobian, also those that Newton does without."""
-    drive.pattern.steady, drive.pattern.negligible = np.inf, 0.0
+    drive.pattern.passing, drive.pattern.negligible = 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,9 @@ class Bench:
         state, placed = self.drive.evaluate(place, rates, 0.0)
         if whole:
             write_all(self.drive)
-        entries = self.drive.pattern.triplets(state, placed, 1.0, by_rate, state.exponent_slopes)
+        entries = self.drive.pattern.triplets(
+            self.drive.chain, state, placed, 1.0, by_rate, state.exponent_slopes
+        )
         size = self.width + self.drive.pattern.unknowns
         matrix = np.zeros((size, size))
         np.add.at(matrix, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])

@@ -103,7 +103,7 @@ def test_a_moment_on_slopes_stretches_no_cross_section() -> None:
 def eliminated(own: CableDrive, place: Array, rates: Array, by_rate: float) -> Array:
     state, placed = own.evaluate(place, rates, 0.0)
     write_all(own)
-    entries = own.pattern.triplets(state, placed, 1.0, by_rate, state.exponent_slopes)
+    entries = own.pattern.triplets(own.chain, state, placed, 1.0, by_rate, state.exponent_slopes)
     own_size = own.path.size
     size = own_size + own.pattern.unknowns
     whole = np.zeros((size, size))

@@ -129,7 +129,7 @@ def test_code_of_others_is_not_run(
 
 
 TINY = """
-from ringsim.frame.vectors import compiled, packed
+from ringsim.compiled.vectors import compiled, packed
 
 @compiled
 def half(x):

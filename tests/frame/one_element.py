@@ -9,8 +9,8 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.compiled.vectors import turned
 from ringsim.frame.kernels import carried, coefficients, element_tangent, middle, scaled
-from ringsim.frame.vectors import turned
 
 Array = NDArray[np.float64]
 REST = (0.0, 0.0, 0.0)

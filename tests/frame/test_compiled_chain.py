@@ -1,4 +1,4 @@
-"""The compiled tension chain against the one that accepted states are evaluated with."""
+"""How frames evaluate the chain and its tangent, against the chain alone."""
 
 from dataclasses import fields
 
@@ -7,25 +7,27 @@ import pytest
 
 from law_scenes import CABLES as CABLES_AND_FAULTS
 from law_scenes import of_cables
-from ringsim.cable.chain import Chain, ChainState, decay_factors, rope_tangent
+from ringsim.cable.chain import ChainState
 from ringsim.cable.friction import BearingFriction, CapstanFriction
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winding import ConstantWinding
-from ringsim.frame.integrate import Integration
-from ringsim.frame.model import FrameModel
-from ringsim.frame.ropes import (
+from ringsim.compiled.chain import (
     PASSING,
+    Chain,
     Drums,
     RopeTable,
     Spans,
-    border,
     factors_needed,
     felt_slopes,
     measure,
     slide,
+    tension_changes,
     tighten,
 )
+from ringsim.frame.cables import spread_changes
+from ringsim.frame.integrate import Integration
+from ringsim.frame.model import FrameModel
 
 pytestmark = pytest.mark.quick
 
@@ -79,19 +81,6 @@ BOTH = (False, True)
 CASES = [(seed, jammed, cut) for seed in range(3) for jammed in BOTH for cut in BOTH]
 
 
-@pytest.mark.parametrize(("seed", "jammed", "cut"), CASES)
-def test_tensions_are_those_of_the_chain(seed: int, jammed: bool, cut: bool) -> None:
-    case = Case(seed, jammed=jammed, cut=cut)
-    truth, spans = case.evaluated(), case.spans
-    largest = truth.tensions.max()
-    assert largest > 1.0
-    assert np.allclose(spans.tension, truth.tensions, rtol=ROUND_OFF, atol=ROUND_OFF * largest)
-    assert np.allclose(spans.share, truth.shares, rtol=ROUND_OFF)
-    slips = case.ropes.slips > 0.0
-    assert np.allclose(spans.exponent[slips], truth.exponents[slips], rtol=1e-9, atol=1e-12)
-    assert np.ptp(np.abs(truth.exponents[slips])) > 0.1  # some turn round, some slip
-
-
 @pytest.mark.parametrize("faults", [False, True], ids=["sound", "faults"])
 def test_accepted_states_are_those_of_the_chain(faults: bool) -> None:
     """All that energies and outputs read of a chain, after a run: whole, jammed and cut ropes."""
@@ -122,33 +111,44 @@ def test_the_border_is_the_tangent_of_the_chain(
 ) -> None:
     """Both points of a span that is not felt are on one frame: its pulls there are no force."""
     case = Case(seed, jammed=jammed, cut=cut, unfelt=unfelt)
-    truth, ropes, by_velocity = case.evaluated(), case.ropes, 40.0
+    truth, ropes, by_rate = case.evaluated(), case.ropes, 40.0
     left = LEFT[: len(ropes.starts)]
     own = truth.exponent_slopes
     slopes = felt_slopes(own, own, truth.slip_speeds)
     count, points = factors_needed(case.table, slopes), sum(POINTS)
-    out = np.zeros((2, count, points, 3))
+    pulls, changes = np.zeros((count, ropes.spans)), np.zeros((count, ropes.spans, 3))
     log_slopes = truth.friction.by_angle(truth.pulleys)
-    border(
+    tension_changes(
         case.table, case.drums, case.log_decays, log_slopes, slopes, case.spans, case.rates, left,
-        by_velocity, out,
+        1.0, by_rate, pulls, changes,
     )  # fmt: skip
+    out = np.zeros((2, count, points, 3))
+    spread_changes(case.table, case.spans, pulls, changes, out)
     found = np.einsum("kpi,kqj->piqj", *out)
 
     expected = np.zeros_like(found)
-    for rope in range(len(ropes.starts)):
-        if not ropes.alive[rope]:
-            continue
-        tangent = rope_tangent(truth, case.rates, rope)
-        mean = left[rope] * tangent.mean_by_place + by_velocity * tangent.mean_by_velocity
-        change = truth.shares[tangent.spans, None, None] * mean
-        logs, by_place, by_rate = decay_factors(truth, tangent, rope, slopes)
-        felt = np.append((slopes * truth.slip_speeds)[ropes.inner(rope)] > PASSING, True)
-        if felt[:-1].any():
-            both = (by_place + by_velocity * by_rate)[felt]
-            change = change + np.tensordot(logs[:, felt], both, 1)
-        near = ropes.near[tangent.spans]
-        pull = change[:, None] * truth.directions[tangent.spans][:, :, None, None]
+    # Pulleys that frames leave out, as their friction no longer changes, count here as well.
+    for rope, pulled, changed in case.chain.changes(
+        truth, case.rates, slopes, left, 1.0, by_rate, passing=PASSING
+    ):
+        spans = slice(ropes.starts[rope], ropes.ends[rope])
+        inner = slopes[ropes.inner(rope)]
+        kept = np.concatenate([[True], inner > 0.0, [True]])[: len(pulled)]
+        change = np.einsum("kn,kmi->nmi", pulled[kept], changed[kept])
+        if len(pulled) > 1:  # the last factor holds the path's part of those left out, too
+            gone = pulled[~kept], changed[~kept]
+            tail = (
+                np.array(
+                    [
+                        np.sum(truth.shares[spans][b:] * truth.lengths[spans][b:])
+                        for b in np.flatnonzero(~kept)
+                    ]
+                )
+                / truth.paths[rope]
+            )
+            change = change + np.einsum("n,k,kmi->nmi", truth.tensions[spans], tail, gone[1])
+        near = ropes.near[spans]
+        pull = change[:, None] * truth.directions[spans][:, :, None, None]
         for i, point in enumerate(near):
             for k, other in enumerate(near):
                 block = pull[i, :, k]
