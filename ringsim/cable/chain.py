@@ -13,9 +13,14 @@ from ringsim.cable.winding import WinchReading
 # The chain at one instant: tensions, forces, powers; and its work between two instants.
 
 
+ROUNDED = 1e-12
+"""Share of its length by which a rope is longer than its path before it counts as slack: one that
+begins as long as its path is off by 1e-15, as lengths of points in another order are summed."""
+
+
 @dataclass(frozen=True)
 class ChainState:
-    """All spans, pulleys and ropes at one instant; see ``ringsim.cable.chain``."""
+    """All spans, pulleys and ropes at one instant; see ``ringsim.compiled.tension``."""
 
     ropes: Ropes
     material: Array
@@ -77,7 +82,8 @@ class ChainState:
     @property
     def is_slack(self) -> Flags:
         """Whether a rope is longer than its path, or cut; shape (ropes,)."""
-        return np.asarray((self.paths < self.natural) | ~self.ropes.alive)
+        longer = self.natural - self.paths > ROUNDED * self.natural
+        return np.asarray(longer | ~self.ropes.alive)
 
     @cached_property
     def winch_tensions(self) -> Array:

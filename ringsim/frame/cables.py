@@ -18,8 +18,8 @@ from ringsim.cable.friction import (
 from ringsim.cable.records import BlockSheave, Cables, Sheave
 from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winches import Winches
-from ringsim.compiled.chain import (
-    Chain,
+from ringsim.compiled.chain import Chain
+from ringsim.compiled.tension import (
     Drums,
     RopeTable,
     Spans,
@@ -267,7 +267,7 @@ def pull_tight(
     spans: Spans,
 ) -> float:  # fmt: skip
     """Spans, with their tensions, at places and rates of the points; returns the least length, NaN
-    if no tensions go with the friction (``ringsim.cable.chain``).
+    if no tensions go with the friction (``ringsim.compiled.chain``).
     """
     least, rows = measure(table, behind, places, rates, spans), laws.decays.rows
     slide(table, drums, spans)

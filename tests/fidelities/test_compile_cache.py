@@ -15,7 +15,7 @@ import pytest
 from ringsim.compile_cache import VARIABLE, choose_folder, compile_once
 
 CHOOSES = "from ringsim.compile_cache import choose_folder\nprint(choose_folder())"
-FRAMES_FIRST = "import os, ringsim.frame\nprint(os.environ['NUMBA_CACHE_DIR'])"
+FRAMES_FIRST = "import os, ringsim.compiled\nprint(os.environ['NUMBA_CACHE_DIR'])"
 COMPILES = """
 import sys, time
 from pathlib import Path

@@ -12,9 +12,9 @@ from ringsim.cable.friction import BearingFriction, CapstanFriction
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winding import ConstantWinding
-from ringsim.compiled.chain import (
+from ringsim.compiled.chain import Chain
+from ringsim.compiled.tension import (
     PASSING,
-    Chain,
     Drums,
     RopeTable,
     Spans,

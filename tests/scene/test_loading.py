@@ -42,10 +42,19 @@ def test_nothing_heavy_is_loaded() -> None:
     assert loaded_by(scene + "".join(calling(*words) for words in verbs)) == set()
 
 
-@pytest.mark.parametrize(("fidelity", "engine"), [("full", {"exudyn"}), ("frame", {"numba"})])
-def test_a_run_loads_its_own_engine_only(fidelity: str, engine: set[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("scene", "fidelity", "engine"),
+    [
+        ("ring18", "full", {"exudyn"}), ("truss2", "full", {"exudyn", "numba"}),
+        ("truss2", "frame", {"numba"}),
+    ],
+)  # fmt: skip
+def test_a_run_loads_its_own_engine_only(
+    scene: str, fidelity: str, engine: set[str], tmp_path: Path
+) -> None:
+    """And compiled code, which evaluates ropes for either."""
     out = str(tmp_path / "run.nc")
-    words = "run", "truss2", "--fidelity", fidelity, "--set", "solver.end_time=0.2", "--out", out
+    words = "run", scene, "--fidelity", fidelity, "--set", "solver.end_time=0.2", "--out", out
     assert loaded_by(calling(*words)) & {"exudyn", "numba"} == engine
 
 

@@ -1,0 +1,405 @@
+"""The law of the ropes, compiled for both engines: tensions of all spans, and how they change."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ringsim.cable.ropes import Array, Indices, Ropes
+from ringsim.compiled.vectors import compiled, dot, minus, plus, put, times, vector
+
+# The tension chain of all cables, from positions and velocities of their pulleys.
+#
+# Spans i = 0 .. n-1 run from the winch to the far end, pulley j = 1 .. n-1 stands between spans
+# j-1 and j.  For each rope (metre, newton, second):
+#
+# Geometry.  L_i and u_i (away from the winch) from the points; the angle between the pulls -u_j-1
+# and u_j is a_j = 2 atan2(\|u_j-1 + u_j\|, \|u_j - u_j-1\|), exact near 0 and pi.
+#
+# Stretch.  S = sum L_i, natural length M = content - wound, mean strain e = (S - M) / M (paper
+# 001's element).  Mean tension q = b ln(1 + exp(y / b)) with y = EA (e + t_d de/dt): smooth in
+# slack, see ``ringsim.cable.ropes``; de/dt = (dS/dt + (S / M) w) / M with w the rate of winding.
+#
+# Friction.  T_i = c_i T_0, c_i = product over j <= i of eta_j^p_j, p_j = tanh(s_j / s_slip): full
+# decay towards the far end while the rope runs to the winch (s_j > 0), inverted where it runs back,
+# uniform tension at rest.  The stretch of span i, T_i L_i M / (S EA), summed over the spans must be
+# S - M; hence T_i = q c_i / (sum c_k L_k / S), that is T_0 = EA (S - M) (S / M) / sum c_k L_k when
+# taut.  To first order of strain these are paper 000's eqs 22-26 corrected (their products of
+# lengths and shifted indices are misprints); for c = 1 it is exactly EA (S - M) / M.  Sums are
+# taken with c relative to its largest value, so that long chains with high friction neither
+# overflow nor divide by zero.
+#
+# A law of friction may depend on the speed s_j, known before, and on the mean of T_j-1 and T_j.
+# The latter is solved for by repetition from q itself: each time the laws see the tensions found
+# last.  It converges as long as the sum of |dln eta_j / dln T| is below 1 or so; elsewhere a state
+# has no answer, as one whose winch has wound up all its rope.
+#
+# Speed of the rope over the pulleys.  Span i holds the natural length m_i.  Rope enters it over
+# pulley i+1 and leaves it over pulley i, so dm_i/dt = s_i+1 - s_i with s_0 = winding at the winch
+# and s_n = -(winding at the far end), 0 where it is fixed.  Summed over the spans beyond pulley j:
+#
+#     s_j = s_n - d/dt sum_{i >= j} m_i        (the rate of length less elongation).
+#
+# With m_i = L_i M / S (each span at the mean strain) and b_j = sum_{i >= j} L_i / S that is
+#
+#     s_j = s_n + w b_j - (M / S) (d/dt sum_{i >= j} L_i - b_j dS/dt).
+#
+# It gives s_0 and s_n exactly, and needs no rate of the tension.  What it leaves out, the change
+# in how the stretch is distributed, is of second order in strain.  Energy is conserved identically:
+# see docs/theory/truss2.md.
+
+
+class RopeTable(NamedTuple):
+    """What faults alone change: first span of each rope and one more than the last, first points of
+    the spans, pulley before each span (-1: none, or jammed there), whether spans are felt, as they
+    are between different frames, and whether a rope is whole; EA (N),
+    Kelvin-Voigt time (s) and slack width (N) of each rope; slip speeds of the pulleys, m/s.
+    """
+
+    starts: Indices
+    ends: Indices
+    near: Indices
+    pulley: Indices
+    felt: Indices
+    alive: Array
+    material: Array
+    slip_speed: Array
+
+    @classmethod
+    def of(cls, ropes: Ropes, material: Array, slip_speed: Array, felt: Indices) -> "RopeTable":
+        """Of the ropes of a chain, whose spans of these numbers are felt."""
+        pulley = np.full(ropes.spans, -1)
+        slips = ropes.slips > 0.0
+        pulley[ropes.behind[slips]] = np.flatnonzero(slips)
+        own = np.zeros(ropes.spans, dtype=np.int64)
+        own[felt] = 1
+        return cls(
+            ropes.starts, ropes.ends, ropes.near, pulley, own, ropes.alive.astype(float),
+            material[:, ropes.cable].T.copy(), slip_speed,
+        )  # fmt: skip
+
+
+class Drums(NamedTuple):
+    """Natural length (m) of each rope, what its winches take up and what comes in at its far end
+    (m/s), shape (ropes,).
+    """
+
+    natural: Array
+    winding: Array
+    inflow: Array
+
+
+class Spans(NamedTuple):
+    """Lengths, their rates and directions of spans; angles at pulleys; tensions of spans, their
+    share of the rope's mean; exponents of the pulleys' friction and speeds of the ropes over them.
+    """
+
+    length: Array
+    rate: Array
+    unit: Array
+    angle: Array
+    tension: Array
+    share: Array
+    exponent: Array
+    speed: Array
+
+    @classmethod
+    def empty(cls, ropes: Ropes) -> "Spans":
+        """Of so many spans and pulleys."""
+        n, pulleys = ropes.spans, len(ropes.behind)
+        one = np.zeros(n)
+        return cls(one, one.copy(), np.zeros((n, 3)), np.zeros(pulleys), one.copy(), one.copy(),
+                   np.zeros(pulleys), np.zeros(pulleys))  # fmt: skip
+
+
+@compiled
+def measure(table: RopeTable, behind: Indices, places: Array, rates: Array, spans: Spans) -> float:
+    """Lengths, rates, directions and angles of places and rates of the points, (points, 3);
+    returns the least length, m.
+    """
+    least = math.inf
+    for i in range(len(spans.length)):
+        k = table.near[i]
+        d = minus(vector(places[k + 1]), vector(places[k]))
+        length = math.sqrt(dot(d, d))
+        unit = times(1.0 / length, d)
+        spans.length[i], least = length, min(least, length)
+        spans.unit[i, 0], spans.unit[i, 1], spans.unit[i, 2] = unit
+        spans.rate[i] = dot(unit, minus(vector(rates[k + 1]), vector(rates[k])))
+    for j in range(len(behind)):
+        before, after = vector(spans.unit[behind[j] - 1]), vector(spans.unit[behind[j]])
+        both, apart = plus(before, after), minus(after, before)
+        spans.angle[j] = 2.0 * math.atan2(math.sqrt(dot(both, both)), math.sqrt(dot(apart, apart)))
+    return least
+
+
+@compiled
+def path_of(spans: Spans, first: int, last: int) -> tuple[float, float]:
+    """Length (m) and its rate (m/s) of the path along spans ``first`` to ``last`` - 1."""
+    path = path_rate = 0.0
+    for i in range(first, last):
+        path += spans.length[i]
+        path_rate += spans.rate[i]
+    return path, path_rate
+
+
+@compiled
+def slide(table: RopeTable, drums: Drums, spans: Spans) -> None:
+    """Speeds of the ropes over the pulleys, and exponents of their friction."""
+    for rope in range(len(table.starts)):
+        first, last = table.starts[rope], table.ends[rope]
+        path, path_rate = path_of(spans, first, last)
+        natural, winding = drums.natural[rope], drums.winding[rope]
+        beyond, rate_beyond = path, path_rate
+        for i in range(first, last):
+            j = table.pulley[i]
+            if i > first:
+                part = beyond / path
+                moved = (rate_beyond - part * path_rate) * natural / path
+                speed = drums.inflow[rope] + winding * part - moved
+                spans.speed[j], spans.exponent[j] = speed, math.tanh(speed / table.slip_speed[j])
+            beyond -= spans.length[i]
+            rate_beyond -= spans.rate[i]
+
+
+@compiled
+def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> None:
+    """Tensions of all spans, whose speeds are known."""
+    for rope in range(len(table.starts)):
+        first, last = table.starts[rope], table.ends[rope]
+        path, path_rate = path_of(spans, first, last)
+        natural, winding = drums.natural[rope], drums.winding[rope]
+        log = most = 0.0
+        for i in range(first, last):
+            if i > first:
+                j = table.pulley[i]
+                log += spans.exponent[j] * log_decays[j]
+                most = max(most, log)
+            spans.share[i] = log
+        mean = 0.0
+        for i in range(first, last):
+            spans.share[i] = math.exp(spans.share[i] - most)
+            mean += spans.share[i] * spans.length[i] / path
+        tension = table.alive[rope] * _tension(table, rope, path, path_rate, natural, winding)
+        for i in range(first, last):
+            spans.share[i] /= mean
+            spans.tension[i] = tension * spans.share[i]
+
+
+@compiled
+def of_ropes(table: RopeTable, drums: Drums, spans: Spans) -> Array:
+    """Of ropes whose spans are known, shape (6, ropes): paths and their rates, strains and theirs,
+    forces before slack and mean tensions.
+    """
+    out = np.zeros((6, len(table.starts)))
+    for rope in range(len(table.starts)):
+        path, path_rate = path_of(spans, table.starts[rope], table.ends[rope])
+        natural, winding = drums.natural[rope], drums.winding[rope]
+        out[0, rope], out[1, rope], out[2, rope] = path, path_rate, path / natural - 1.0
+        out[3, rope] = (path_rate + path / natural * winding) / natural
+        out[4, rope] = force_of(table, rope, path, path_rate, natural, winding)
+        tension = _tension(table, rope, path, path_rate, natural, winding)
+        out[5, rope] = table.alive[rope] * tension
+    return out
+
+
+@compiled
+def force_of(
+    table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
+) -> float:
+    """Elastic and viscous force of a rope before slack."""
+    strain_rate = (path_rate + path / natural * winding) / natural
+    stretch: float = path / natural - 1.0 + table.material[rope, 1] * strain_rate
+    return stretch * float(table.material[rope, 0])
+
+
+@compiled
+def _tension(
+    table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
+) -> float:
+    force, width = force_of(table, rope, path, path_rate, natural, winding), table.material[rope, 2]
+    smooth: float = width * math.log1p(math.exp(max(-abs(force) / width, -200.0)))
+    return max(force, 0.0) + smooth
+
+
+# Derivatives of the cable's forces after positions and velocities of its points.
+#
+# Every span pulls with f_i = T_i u_i, so with the differences D x = x_i+1 - x_i of the points
+#
+#     F = -D^T f,   dF = -D^T (u_i dT_i + T_i (I - u_i u_i^T) / L_i D dx).
+#
+# The second part is the geometric tangent (paper 001), block by block on the spans.  For the
+# first, T_i = q c_i / cbar with cbar = sum c_k L_k / S, and weights omega_k = c_k L_k / sum c L:
+#
+#     dT_i = (c_i / cbar) dq                                                       material
+#          + T_i (dln c_i - sum_k omega_k (dln c_k + dL_k / L_k) + dS / S)         decay
+#
+#     dq = q'(y) EA (dS / M + t_d (w dS / M^2 + d(dS/dt) / M)),
+#     dln c_i = sum_{j <= i} (p_j dln eta_j/da da_j + ln eta_j (1 - p_j^2) / s_slip ds_j).
+#
+# L_i, dL_i/dt, a_j and s_j depend on neighbouring points alone, so everything is written on the
+# differences of points, and in few factors dT = A dlog: no full matrices are formed.
+#
+# ln eta_j / ds_j of a law of speed comes beside (1 - p_j^2) / s_slip.  That laws of tension change
+# with what is sought is left out: Newton's method takes up to twice the iterations where a rope is
+# nearly slack, so that such a law changes fast (tests/cable_engine/own_laws/stribeck.py).
+#
+# Where the rope runs straight over a pulley the angle has a kink (the wrap angle cannot be
+# negative); its derivative is taken as zero there, the mean of both sides.
+
+
+STRAIGHT = 1e-7
+"""Sine of the angle between the pulls below which its derivative is taken as zero: far above the
+rounding of unit vectors (1e-16), far below the angles of any path that bends."""
+PASSING = 2e-4
+"""Slope of a pulley's friction over that at rest below which Newton's tangent does without it: more
+than 0.9999 of the friction acts, and the rope's speed no longer changes it."""
+
+
+def felt_slopes(slopes: Array, own: Array, slip_speed: Array) -> Array:
+    """Slopes of the pulleys' friction, s/m, less those that tangents do without: of pulleys that
+    slip, and that Newton has seen on one side alone (``ringsim.stepping.locks``): then slopes are
+    their ``own``.  In a step of 0.1 us a light hinge assembly may turn to and fro at 300 m/s, and
+    only a slope of a hundred-thousandth of that at rest leads it to its place.
+    """
+    return np.where((slopes * slip_speed > PASSING) | (slopes > own), slopes, 0.0)
+
+
+def with_law_slopes(
+    slopes: Array, exponents: Array, by_speed: Array, log_decays: Array, slip_speed: Array,
+    passing: float = PASSING,
+) -> Array:  # fmt: skip
+    """Slopes of exponents times decays over the decays, s/m: those of the exponents with those of
+    laws that depend on speed, whose derivatives ``by_speed`` are; slow ones are left out.
+    """
+    more = np.abs(exponents) * by_speed / np.minimum(log_decays, -1e-300)
+    return np.asarray(slopes + np.where(np.abs(more) * slip_speed > passing, more, 0.0))
+
+
+@compiled
+def _turns(table: RopeTable, slopes: Array, span: int) -> bool:
+    """Whether the friction of the pulley before a span changes with speed."""
+    return bool(table.pulley[span] >= 0 and slopes[table.pulley[span]] != 0.0)
+
+
+@compiled
+def factors_needed(table: RopeTable, slopes: Array) -> int:
+    """Number of factors that ``tension_changes`` finds."""
+    count = 0
+    for rope in range(len(table.starts)):
+        if table.alive[rope] > 0.0:
+            own, begun = 0, False
+            for b in range(table.starts[rope] + 1, table.ends[rope]):
+                begun = begun and table.felt[b - 1] == 0
+                if _turns(table, slopes, b):
+                    own += not begun
+                    begun = True
+            count += own + 1 + (own > 0)
+    return count
+
+
+@compiled
+def tension_changes(
+    table: RopeTable,
+    drums: Drums,
+    log_decays: Array,
+    log_slopes: Array,
+    slopes: Array,
+    spans: Spans,
+    velocities: Array,
+    left: Array,
+    by_place: float,
+    by_rate: float,
+    pulls: Array,
+    changes: Array,
+) -> None:
+    """Changes of tension in k factors: tensions of the spans, N, shape (k, spans), and what they
+    change with, after the differences of the points, shape (k, spans, 3).
+
+    Derivatives after places are taken ``by_place`` times, those after rates ``by_rate`` times; both
+    results are zeros before.  The first factor of a rope is that of its mean tension, with the
+    share ``left`` of its stiffness that its winches do not answer.  ``log_slopes`` are the
+    derivatives of ``log_decays`` after the angles, 1/rad, ``slopes`` those of the exponents after
+    the rope's speed, s/m.
+
+    A pulley's friction changes all spans behind it, less their share of the path.  Pulleys between
+    which no span is felt change the same ones, and have one factor; their shares of the path go to
+    the last factor of the rope.
+    """
+    n = len(spans.length)
+    swing = np.empty((n, 3))
+    for i in range(n):
+        k = table.near[i]
+        moving = minus(vector(velocities[k + 1]), vector(velocities[k]))
+        aside = minus(moving, times(spans.rate[i], vector(spans.unit[i])))
+        for c in range(3):
+            swing[i, c] = aside[c] / spans.length[i]
+    row = 0
+    for rope in range(len(table.starts)):
+        if table.alive[rope] == 0.0:
+            continue
+        first, last = table.starts[rope], table.ends[rope]
+        path, path_rate = path_of(spans, first, last)
+        natural, winding = drums.natural[rope], drums.winding[rope]
+        force = force_of(table, rope, path, path_rate, natural, winding)
+        slack = 0.5 + 0.5 * math.tanh(0.5 * force / table.material[rope, 2])
+        elastic = table.material[rope, 0] / natural * slack
+        viscous = elastic * table.material[rope, 1]
+        own = by_place * left[rope]
+        stretched = own * (elastic + viscous * winding / natural) + by_rate * viscous
+        for i in range(first, last):
+            pulls[row, i] = spans.share[i]
+            put(changes[row, i], times(stretched, vector(spans.unit[i])))
+            put(changes[row, i], times(own * viscous, vector(swing[i])))
+        row += 1
+        ratio, turned, begun = natural / path, False, False
+        steadily = winding + ratio * path_rate
+        part, part_rate, tail = path, path_rate, path
+        longer = np.zeros((last - first, 3))
+        for b in range(first + 1, last):
+            j = table.pulley[b]
+            part -= spans.length[b - 1]
+            part_rate -= spans.rate[b - 1]
+            tail -= spans.share[b - 1] * spans.length[b - 1]
+            if begun and table.felt[b - 1] > 0:
+                row, begun = row + 1, False
+            if not _turns(table, slopes, b):
+                continue
+            felt = log_decays[j] * slopes[j]
+            share = part / path
+            for i in range(first, last):
+                here = 1.0 if i >= b else 0.0
+                rate_part = -ratio * felt * (here - share)
+                length_part = felt * (
+                    steadily / path * (here - share)
+                    + ratio / path * (part_rate - share * path_rate)
+                )
+                change = plus(
+                    times(by_place * length_part + by_rate * rate_part, vector(spans.unit[i])),
+                    times(by_place * rate_part, vector(swing[i])),
+                )
+                if i >= b and not begun:
+                    pulls[row, i] = spans.tension[i]
+                put(changes[row, i], change)
+                put(longer[i - first], times(-tail / path, change))
+            turned = begun = True
+            before, after = vector(spans.unit[b - 1]), vector(spans.unit[b])
+            cosine = dot(before, after)
+            aside = minus(after, times(cosine, before))
+            sine = math.sqrt(dot(aside, aside))
+            if sine > STRAIGHT:
+                bent = by_place * spans.exponent[j] * log_slopes[j] / sine
+                ahead = times(bent / spans.length[b - 1], aside)
+                back = times(bent / spans.length[b], minus(before, times(cosine, after)))
+                put(changes[row, b - 1], ahead)
+                put(changes[row, b], back)
+                put(longer[b - 1 - first], times(-tail / path, ahead))
+                put(longer[b - first], times(-tail / path, back))
+        if turned:
+            row += begun
+            for i in range(first, last):
+                stretch = by_place * (1.0 - spans.share[i]) / path
+                pulls[row, i] = spans.tension[i]
+                put(changes[row, i], times(stretch, vector(spans.unit[i])))
+                put(changes[row, i], vector(longer[i - first]))
+            row += 1
