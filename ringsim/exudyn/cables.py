@@ -23,9 +23,10 @@ from ringsim.stepping.locks import Turning
 # tension.  The coupling of all spans of a rope through its mean tension is then a few sparse rows
 # instead of a dense block over the whole ring; eliminating the unknowns gives P^T (dF/dx) P with
 # the material, decay and geometric parts of ringsim.compiled.tension.  The decay part alone is
-# dense (spans by spans).  Its entries are written only where they matter to Newton's convergence: those
-# of friction that turns round within a step.  Velocities of the points are taken as fixed while
-# nodes turn at fixed rates; against the rest that is of the order of a node's turn within one step.
+# dense (spans by spans).  Its entries are written only where they matter to Newton's convergence:
+# those of friction that turns round within a step.  Velocities of the points are taken as fixed
+# while nodes turn at fixed rates; against the rest that is of the order of a node's turn within one
+# step.
 
 
 class JacobianPattern:
