@@ -3,13 +3,16 @@
 import operator
 import re
 import tomllib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ringsim.cable.records import number_of, path_of
 from ringsim.choice import kinds_of
 from ringsim.refusal import InputError
 from ringsim.structures.family import Structure
 from ringsim.units import LEFT_OUT
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 MOST_SECTIONS = 1000
 """A table that asks for more is refused, and names of their pulleys would only fill the memory."""
@@ -129,7 +132,7 @@ def place_of(path: str, *, closed: bool) -> str | None:
     return "section"
 
 
-def length_at(scene: Any, path: str) -> int | None:
+def length_at(scene: "Scene | dict[str, Any]", path: str) -> int | None:
     """Values in a list at ``path``, also of tables; None: any number."""
     place = place_of(path, closed=at_path(scene, "structure.closed") is not False)
     sections = at_path(scene, "structure.sections")
@@ -138,7 +141,7 @@ def length_at(scene: Any, path: str) -> int | None:
     return {"section": sections, "corner": sections + 1}.get(place or "")
 
 
-def points_in(scene: Any) -> tuple[str, ...]:
+def points_in(scene: "Scene | dict[str, Any]") -> tuple[str, ...]:
     """What cables run along, also of tables; nothing where these are sure to be refused."""
     kind = str(at_path(scene, "structure.kind") or "pantograph-ring")
     structure: Any = kinds_of(Structure).get(kind)
@@ -151,19 +154,19 @@ def points_in(scene: Any) -> tuple[str, ...]:
     return tuple(structure.cable_points(sections)) if usable else ()
 
 
-def pulleys_at(scene: Any, path: str) -> tuple[str, ...]:
+def pulleys_at(scene: "Scene | dict[str, Any]", path: str) -> tuple[str, ...]:
     """Names of the pulleys that a list at ``path`` has values for, if it has."""
     return _cable_at(scene, path)[1:-1]
 
 
-def _cable_at(scene: Any, path: str) -> tuple[str, ...]:
+def _cable_at(scene: "Scene | dict[str, Any]", path: str) -> tuple[str, ...]:
     """Names of the points of the cable whose pulleys a list at ``path`` has values for."""
     points = points_in(scene) if place_of(path, closed=True) == "pulley" else ()
     end = at_path(scene, ".".join([*path.split(".")[:2], "end"]))
     return path_of(points, end) if points else ()
 
 
-def with_number(scene: Any, path: str) -> str:
+def with_number(scene: "Scene | dict[str, Any]", path: str) -> str:
     """A path with the number of a pulley instead of its name; InputError if it is unknown."""
     inner, name = section_of(path)
     cable = _cable_at(scene, inner) if isinstance(name, str) else ()

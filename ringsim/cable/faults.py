@@ -1,11 +1,14 @@
 """Faults of cables: what is cut or jammed, where and when."""
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from ringsim.cable.ropes import Array, Ropes
 from ringsim.parts.faults import Fault, Struck
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # The family of cable faults.
 
@@ -24,7 +27,7 @@ class CableFault(Fault):
         """See ``Fault``."""
         now.ropes = self.whole(now.ropes)
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """See ``Fault``."""
         if scene.cables is None:
             raise ValueError(

@@ -4,7 +4,7 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,9 @@ from ringsim.parts.laws import AngleLaw, Corners, PairLaw, Reaction, Rub
 from ringsim.parts.persection import spread
 from ringsim.parts.rods import Tube
 from ringsim.refusal import InputError
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # What holds a structure: its boom and, at the boom's upper end, the ground or a spacecraft.
 
@@ -252,7 +255,7 @@ class Draft:
     ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity``, ``offload`` and ``cables``.
     """
 
-    scene: Any
+    scene: "Scene"
     bodies: list[Body] = field(default_factory=list)
     rods: list[Rod] = field(default_factory=list)
     joints: list[Joint] = field(default_factory=list)
@@ -275,7 +278,7 @@ class Draft:
         ends: Sequence[Any],
         normal: Any,
         tube: Tube,
-        stations: Sequence[float],
+        stations: Sequence[float] | Array,
         young_modulus: float,
         masses: tuple[tuple[int, float, str], ...] = (),
         strain: float = 0.0,
@@ -374,9 +377,10 @@ class Draft:
             pair_laws=(*self.pairs, *self._net()),
             rubs=tuple(self._rub(*one) for one in self.scene.joints.present().items()),
         )
-        if not any(law.hung for law in layout.pair_laws):
+        net = self.scene.net
+        if net is None or not any(law.hung for law in layout.pair_laws):
             return layout
-        return balanced(replace(layout, hub=Hub(np.zeros(3), self.scene.net.point_mass)))
+        return balanced(replace(layout, hub=Hub(np.zeros(3), net.point_mass)))
 
     def _angle_laws(self, openings: Sequence[Sequence[Opening]]) -> tuple[AngleLaw, ...]:
         """Of stops, springs, latches and faults; InputError without V-joints that they act on."""
@@ -462,8 +466,10 @@ class Draft:
         )
 
     def _paths(self) -> tuple[tuple[Sheave, ...], ...]:
-        cables, found = self.scene.cables, []
-        for plane, cable in () if cables is None else cables.present():
+        cables, found = self.scene.cables, list[tuple[Sheave, ...]]()
+        if cables is None:
+            return ()
+        for plane, cable in cables.present():
             if plane not in self.tracks:
                 raise ValueError(
                     f"cables: this structure has no track for a cable in plane {plane + 1}: leave "

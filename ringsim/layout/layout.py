@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,9 @@ from ringsim.layout.bodies import (
 )
 from ringsim.parts.ground import Offload
 from ringsim.parts.laws import AngleLaw, PairLaw, Rub
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # A structure at one value of its coordinate: the one description that every room reads.
 
@@ -253,7 +256,7 @@ class Layout:
         return rows
 
 
-def layout_of(scene: Any, coordinate: float | None = None) -> Layout:
+def layout_of(scene: "Scene", coordinate: float | None = None) -> Layout:
     """The layout of a scene's structure at a coordinate (rad), or as it starts.
 
     >>> from ringsim.scene import load_scene
@@ -262,10 +265,10 @@ def layout_of(scene: Any, coordinate: float | None = None) -> Layout:
     (6, 12, 24)
     """
     q = scene.structure.coordinate if coordinate is None else coordinate
-    return cast(Layout, scene.structure.layout(scene, q + 1j * STEP))
+    return scene.structure.layout(scene, q + 1j * STEP)
 
 
-def layout_at_opening(scene: Any, opening: float) -> Layout:
+def layout_at_opening(scene: "Scene", opening: float) -> Layout:
     """The layout at which the mean opening angle has a value (rad), by Newton's method.
 
     Raises

@@ -1,6 +1,6 @@
 """The boom that a structure stands on, and the spacecraft that carries it."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,9 @@ from pydantic import Field, model_validator
 
 from ringsim.parts.rods import Tube
 from ringsim.units import Density, Kilogram, ListIn, Metre, Model, Pascal, SignedMetre, Unit
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # The family of booms.
 
@@ -97,7 +100,7 @@ class Spacecraft(Model):
                 )
         return self
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """Raise a ValueError where a scene has nothing that a spacecraft could carry."""
         if scene.boom is None:
             raise ValueError(

@@ -2,13 +2,16 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ringsim.parts.laws import AngleLaw, AngleRecord, Array, Place, Reaction, Switches, two_sided
 from ringsim.units import Model, SecondOrZero, TorsionDamping, TorsionRate
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # The family of faults: things that break at a given time and place.
 
@@ -59,7 +62,7 @@ class Fault(Model):
         """The V-joint whose latch no longer catches, if it is such a fault."""
         return None
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """Raise a ValueError, told behind the fault's name, where a scene has nothing to break."""
 
 
@@ -91,7 +94,7 @@ class FailedLatch(JointFault):
         """See ``Fault``."""
         return self.place(planes)
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """See ``Fault``."""
         if scene.stop is None or not scene.stop.latch:
             raise ValueError(
@@ -113,7 +116,7 @@ class FailedSpring(JointFault):
         for law in now.switches.of_group("springs"):
             now.switches.set(law, self.place(now.planes), on=0.0)
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """See ``Fault``."""
         if scene.hinge_spring is None:
             raise ValueError(

@@ -1,6 +1,6 @@
 """What acts from outside: gravity, loads, and the lines and trolleys of a ground test."""
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from ringsim.units import (
     SpringRate,
     Unit,
 )
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # Gravity.
 
@@ -44,7 +47,7 @@ class Gravity(Model):
     ]
     """Acceleration of what falls freely, along x, y and z of space."""
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """Raise a ValueError where nothing would carry the weight, or lines would carry what they
         are not meant to.
         """
@@ -139,7 +142,7 @@ class Offload(Model):
         chosen = [corner - 1 for corner in self.corners] if len(each) > 1 else []
         return float(each[chosen or slice(None)].mean())
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """Raise a ValueError where there is no weight, or no such corner."""
         if scene.gravity is None:
             raise ValueError(

@@ -1,13 +1,16 @@
 """Temperatures of parts, and what they change."""
 
 from itertools import pairwise
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from ringsim.parts.persection import PerSection
 from ringsim.units import ListIn, Model, Unit
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 Kelvin = Annotated[float, Field(ge=1.0, le=2000.0), Unit("K")]
 Expansion = Annotated[float, Field(ge=-1e-3, le=1e-3), Unit("1/K")]
@@ -111,7 +114,7 @@ class Temperature(Model):
     pulley: PulleyTemperature | None = None
     """Of the pulleys; left out, their friction is as given."""
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """Raise a ValueError where a table does not reach, or has nothing to act on."""
         tables = [(name, group, group.stiffness) for name, group in self.rods()]
         for name, group, table in tables:

@@ -4,12 +4,15 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import chain, pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.parts.faults import AT_ONCE
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # The times at which something begins, ends or breaks in a scene: steps end there.
 #
@@ -21,7 +24,7 @@ from ringsim.parts.faults import AT_ONCE
 class Events:
     """The events of a scene; ``times`` are increasing, s."""
 
-    def __init__(self, scene: Any) -> None:
+    def __init__(self, scene: "Scene") -> None:
         """Faults strike, loads turn round, winches start and stop, and their laws bend, see
         ``Winch.breaks``.
         """

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from ringsim.parts.laws import Switches
 from ringsim.parts.persection import spread
 from ringsim.stepping.instant import Array, Instant, Remembering
 from ringsim.variables import PLANES, Fate
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # Which V-joints have reached their stops, when, and how steps should meet them.
 
@@ -169,7 +172,7 @@ class Locks(Remembering):
         )
 
 
-def locks_of(scene: Any, angles: Array, latches: "Latches") -> Locks | None:
+def locks_of(scene: "Scene", angles: Array, latches: "Latches") -> Locks | None:
     """Those of a scene that begins with these opening angles (rad); None if none lock."""
     structure, cables = scene.structure, () if scene.cables is None else scene.cables.present()
     if not structure.locks:
@@ -237,7 +240,7 @@ class Latches(Remembering):
 
     changing = ("caught", "_past")
 
-    def __init__(self, scene: Any) -> None:
+    def __init__(self, scene: "Scene") -> None:
         shape = len(scene.structure.planes), scene.structure.sections
         self.caught = np.zeros(shape, dtype=bool)
         self._present = scene.stop is not None and scene.stop.latch
@@ -284,7 +287,7 @@ class Latches(Remembering):
                 self.caught[place] = True
 
 
-def history(scene: Any, times: Array, angles: Array, rates: Array) -> History:
+def history(scene: "Scene", times: Array, angles: Array, rates: Array) -> History:
     """What became of the latches of a scene in a run; see ``meetings``."""
     latches, found = Latches(scene), History(*np.full((2, *angles.shape[1:]), np.nan))
     for one in meetings(times, angles, rates):

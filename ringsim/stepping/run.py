@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from ringsim.stepping.control import RunControl
 from ringsim.stepping.events import Events
 from ringsim.stepping.instant import Energies, Instant, Remembering, Scales, Strained
 from ringsim.stepping.locks import Latches, locks_of
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -37,7 +40,7 @@ class Run(Remembering):
     _cables: Any
     history: Any
 
-    def __init__(self, scene: Any, watch: Any) -> None:
+    def __init__(self, scene: "Scene", watch: Any) -> None:
         self._scene, self._watch = scene, watch
         self._faults, self._events = Faults(scene.faults), Events(scene)
         self._turn = scene.loads_turn_at

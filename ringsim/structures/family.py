@@ -11,6 +11,9 @@ from ringsim.layout.layout import Layout
 from ringsim.parts.persection import PerSection
 from ringsim.units import Model, Unit
 
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
+
 # The family of structures.
 
 
@@ -63,7 +66,7 @@ class Structure(Model):
         """Largest force of its own springs along the whole travel, N; 0 without springs."""
         return 0.0
 
-    def layout(self, scene: Any, coordinate: Any) -> Layout:
+    def layout(self, scene: "Scene", coordinate: Any) -> Layout:
         """What it consists of at a value of the coordinate, with all parts of a scene.
 
         The imaginary part ``ringsim.layout.bodies.STEP`` of the coordinate carries the derivatives:
@@ -103,7 +106,7 @@ class Structure(Model):
         """
         raise NotImplementedError
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """Raise a ValueError with part, value and cure where a scene does not go with this kind."""
 
 

@@ -3,7 +3,7 @@
 import functools
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from ringsim.parts.persection import PerSection, spread
 from ringsim.parts.rods import errors_of
 from ringsim.structures.family import HingeError, Structure
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # Fold states of the pantograph ring: every point as a function of one angle.
 #
@@ -347,7 +350,7 @@ class PantographRing(Structure):
         self.geometry()
         return self
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """See ``Structure``."""
         for rod in ("diagonal", "bar"):
             tube, longest = f"rods.{rod}.outer_diameter", f"structure.half_{rod}"
@@ -444,7 +447,7 @@ class PantographRing(Structure):
         slope = ratio * c * s / h
         return np.array([[1.0, c, s, h], [0.0, -s, c, slope]])
 
-    def layout(self, scene: Any, coordinate: Any) -> Layout:
+    def layout(self, scene: "Scene", coordinate: Any) -> Layout:
         """See ``Structure``; the coordinate is phi, and every point that of ``RingGeometry``."""
         draft, geometry = Draft(scene), self.geometry()
         fold = geometry.fold(coordinate)

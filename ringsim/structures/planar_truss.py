@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,9 @@ from ringsim.parts.laws import PairLaw, PairRecord, Reaction, one_sided, two_sid
 from ringsim.parts.rods import Tube
 from ringsim.structures.family import Structure
 from ringsim.units import DampingRate, Metre, Model, SpringRate
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
 
 # The planar truss: a parallelogram with a telescopic strut and a cable along its diagonal.
 #
@@ -215,7 +218,7 @@ class PlanarTruss(Structure):
         """See ``Structure``."""
         return "lower joint", "upper outer joint"
 
-    def check(self, scene: Any) -> None:
+    def check(self, scene: "Scene") -> None:
         """See ``Structure``: parts of rings are refused, the cable is needed."""
         for name in ("stop", "boom", "spacecraft", "offload", "net", "loads"):
             if getattr(scene, name) is not None:
@@ -291,7 +294,7 @@ class PlanarTruss(Structure):
         del cable
         return float(np.sum(self.geometry().cable_rate(angles)))
 
-    def layout(self, scene: Any, coordinate: Any) -> Layout:
+    def layout(self, scene: "Scene", coordinate: Any) -> Layout:
         """See ``Structure``; the coordinate is the beams' angle from the axis.
 
         Everything moves in the plane x (outward), y (along the axis).  The beams are elastic; the
