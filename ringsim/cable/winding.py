@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -50,6 +50,11 @@ class WinchReading:
 
 class Winding(Model):
     """Any winding law; time counts from the start of its winch."""
+
+    @property
+    def motor(self) -> "MotorWinding | None":
+        """The motor with its gears, of a law that has one."""
+        return None
 
     def usual_speed(self) -> float:
         """Speed of the winch for most of its time, m/s, as far as known beforehand; never negative.
@@ -210,6 +215,11 @@ class MotorWinding(FeedbackWinding):
                 f"speed = {self.speed} rad/s must be below voltage * no_load_speed = {fastest:g} "
                 "rad/s: the motor has no torque at its speed (lower it, or raise the voltage)"
             )
+        return self
+
+    @property
+    def motor(self) -> Self:
+        """Itself."""
         return self
 
     @property

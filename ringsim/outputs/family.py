@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Cable
-from ringsim.cable.winding import MotorWinding
 from ringsim.choice import kind_of
 from ringsim.hermite import cubic, monotone_slopes
 from ringsim.outputs.meters import Reading
@@ -351,8 +350,8 @@ def in_all_planes(values: Array, planes: Sequence[str]) -> Array:
 
 def holds(scene: Scene) -> set[str]:
     """Everything that a variable may need and the scene has."""
-    windings = [winch.winding for cable in _cables(scene) for winch in cable.winches]
-    motors = [winding for winding in windings if isinstance(winding, MotorWinding)]
+    winches = (winch for cable in _cables(scene) for winch in cable.winches)
+    motors = [motor for winch in winches if (motor := winch.winding.motor) is not None]
     held = {name: getattr(scene, name) is not None for name in type(scene).parts()}
     held |= {
         kind_of(scene.structure): True,

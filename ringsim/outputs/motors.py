@@ -154,8 +154,8 @@ def _motors(
     for steps, scene in run.stretches():
         for plane, cable in [] if scene.cables is None else scene.cables.present():
             for end, winch in enumerate(cable.winches):
-                if isinstance(winch.winding, MotorWinding):
-                    yield steps, (plane, end), winch, winch.winding
+                if (motor := winch.winding.motor) is not None:
+                    yield steps, (plane, end), winch, motor
 
 
 # Drive and resistance by kind along a run, and the static margin between them by a standard.

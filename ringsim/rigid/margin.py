@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.cable.winding import MotorWinding
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import Array
 from ringsim.parts.faults import AT_ONCE
@@ -92,10 +91,9 @@ class DriveMargin:
     @property
     def factors(self) -> dict[str, float]:
         """The standard's factor of every kind of resistance that motorisation multiplies."""
-        motors = any(
-            isinstance(winch.winding, MotorWinding) for winch in self.conditions.winches.values()
-        )
-        found = {PULLEYS: self.standard.friction} if self.conditions.winches else {}
+        winches = self.conditions.winches.values()
+        motors = any(winch.winding.motor is not None for winch in winches)
+        found = {PULLEYS: self.standard.friction} if winches else {}
         found |= {GEARS: self.standard.friction} if motors else {}
         known = (one for one in self._resistances if one.category != "inertia")
         return found | {one.kind: self.standard.factor(one.category) for one in known}
