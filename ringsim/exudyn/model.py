@@ -168,15 +168,20 @@ class _Side:
         rigid = len(found[0]) == 7
         self._read = GeometricallyExact().read if rigid else model.formulation.read
         self.arms = arms if rigid and arms.any() else None
+        mounts = [(joint.part.first, joint.part.second)[side] for joint in joints]
+        bodies = any(isinstance(mount, OnBody) for mount in mounts)
+        own = [mount.axes if isinstance(mount, OnBody) else np.eye(3) for mount in mounts]
+        self._axes = np.array(own) if bodies else None
+        """Of joints on bodies, in the axes of these; nodes of rods stand as their joints do."""
 
     def frames(self, state: State) -> NodeFrames:
-        """Frames of the nodes."""
-        return self._read(state.position[self._where], state.velocity[self._where])
-
-    def spin_about(self, state: State, axes: Array) -> Array:
-        """Angular rate about axes, shape (n, 3), rad/s; of nodes with Euler parameters."""
+        """Frames of the mounts."""
         place, rates = state.position[self._where], state.velocity[self._where]
-        return np.asarray(np.sum(spin(place[:, 3:7], rates[:, 3:7]) * axes, axis=1))
+        if self._axes is None:
+            return self._read(place, rates)
+        axes = axes_of(place[:, 3:7]) @ self._axes
+        turning = np.sum(spin(place[:, 3:7], rates[:, 3:7]) * axes[:, :, 2], axis=1)
+        return NodeFrames(axes[:, :, 1], axes[:, :, 2], turning)
 
     def points(self, state: State) -> Array:
         """Places of the mounts, shape (n, 3), m."""
@@ -202,11 +207,7 @@ class JointGroup:
 
     def rate(self, state: State) -> Array:
         """Relative angular rate about the joint axis, rad/s."""
-        rod, second = self._first.frames(state), self._second
-        # A second side with arms is on bodies, whose own z is not the joint's axis.
-        bodies = second.arms is not None
-        other = second.spin_about(state, rod.z) if bodies else second.frames(state).spin
-        return np.asarray(other - rod.spin)
+        return np.asarray(self._second.frames(state).spin - self._first.frames(state).spin)
 
     def gaps(self, state: State) -> Array:
         """Distances of the points that the joints hold together, m."""

@@ -104,8 +104,7 @@ def lines_of(
         ends = near, near + 1
         if frame[near] == frame[near + 1]:
             continue
-        inner = [int(frame[k]) for k in ends if frame[k] >= len(skeleton.layout.bodies)]
-        front, _ = parts.front_of(int(parts.home[inner[0]]))
+        front = parts.front_holding([int(frame[k]) for k in ends], "a cable's span")
         row = parts.local(front, [(int(frame[k]), int(angle[k])) for k in ends])
         spans.append(span)
         fronts.append(front)

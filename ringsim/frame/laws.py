@@ -324,7 +324,7 @@ class Openings(NamedTuple):
     def of(cls, skeleton: Skeleton) -> "Openings":
         """Those of a layout."""
         found = [
-            [(skeleton.angle_of[o.joint], o.sense) for o in plane if isinstance(o, JointOpening)]
+            [_followed(skeleton, one) for one in plane if isinstance(one, JointOpening)]
             for plane in skeleton.layout.openings
         ]
         if not all(found):
@@ -340,6 +340,12 @@ class Openings(NamedTuple):
     def read(self, angles: Array, rates: Array) -> tuple[Array, Array]:
         """Opening angles and rates, rad and rad/s."""
         return np.pi - self.sense * angles[self.angle], -self.sense * rates[self.angle]
+
+
+def _followed(skeleton: Skeleton, opening: JointOpening) -> tuple[int, float]:
+    """Number of its angle, and the sense in which it opens with it."""
+    number = skeleton.angle_of[opening.joint]
+    return number, opening.sense * skeleton.angles[number].sense
 
 
 class JointLaws:

@@ -9,7 +9,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.layout.bodies import Array, InSpace, Joint, Mount, OnBody, OnRod, Pose, stiffness_of
+from ringsim.layout.bodies import (
+    Array,
+    InSpace,
+    Joint,
+    JointOpening,
+    Mount,
+    OnBody,
+    OnRod,
+    Pose,
+    stiffness_of,
+)
 from ringsim.layout.layout import SPACECRAFT, BoomBeam, Layout
 from ringsim.parts.rods import Rods, Tube
 from ringsim.refusal import InputError
@@ -74,6 +84,9 @@ class Skeleton:
         self.beam: list[End] = []
         self._ends: dict[tuple[int, int], End] = {}
         self.angle_of: dict[int, int] = {}
+        self._opening = {
+            one.joint for plane in layout.openings for one in plane if isinstance(one, JointOpening)
+        }
         revolutes = [(n, j) for n, j in enumerate(layout.joints) if j.kind == "revolute"]
         for joint in layout.joints:
             self._hold(joint)
@@ -151,9 +164,14 @@ class Skeleton:
         pose, other = self.layout.pose(rod), self.layout.bodies[body.body].pose
         # The joint's rate is that of its second part against its first.
         sense = 1.0 if swapped else -1.0
-        angle = self._angle(number, sense, 0.0, float((pose.turn - other.turn) @ pose.axes[:, 2]))
-        key = rod.rod, rod.station
-        self._ends[key] = End(body.body, body.arm, other.axes.T @ pose.axes, angle)
+        axes, start = other.axes.T @ pose.axes, 0.0
+        if number in self._opening:  # its angle counts from the body's own axes there
+            axes = body.axes
+            x, along = (other.axes @ axes)[:, :2].T, pose.axes[:, 0]
+            start = float(np.arctan2(along @ x[1], along @ x[0]))
+        rate = float((pose.turn - other.turn) @ pose.axes[:, 2])
+        angle = self._angle(number, sense, start, rate)
+        self._ends[rod.rod, rod.station] = End(body.body, body.arm, axes, angle)
 
     def _cross(self, number: int, joint: Joint) -> None:
         """A second rod's node on the first one's."""
@@ -278,6 +296,16 @@ class Parts:
         """The front that eliminates an unknown, and its place there."""
         front = bisect_right(self._firsts, unknown) - 1
         return front, unknown - self._firsts[front]
+
+    def front_holding(self, frames: Sequence[int], what: str) -> int:
+        """The front with all unknowns of some frames that is eliminated first; InputError with
+        ``what`` connects them if there is none.
+        """
+        homes = [int(self.home[frame]) for frame in frames]
+        front = min(self.front_of(home)[0] for home in homes)
+        if not set(homes) <= set(self.spots[front, : self.size[front]].tolist()):
+            raise InputError(f"{NOT_HERE} {what} between corners that are no neighbours: {CURE}")
+        return front
 
     def _inner_of(self, end: End) -> list[int]:
         """Inner frames, and angles behind them, of an end."""

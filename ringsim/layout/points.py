@@ -142,7 +142,9 @@ def _ends(layout: Layout) -> Iterator[Where]:
 
 
 def _lines(layout: Layout) -> Iterator[tuple[str, Where, Where]]:
-    """Every line with its group: halves of rods, bodies to what hangs on them, boom, net."""
+    """Every line with its group: halves of rods, bodies to what hangs on them, boom, net, and pairs
+    of other laws.
+    """
     for row in layout.halves().values():
         for half in row:
             ends = OnRod(half.rod, half.first), OnRod(half.rod, half.last)
@@ -167,12 +169,8 @@ def _lines(layout: Layout) -> Iterator[tuple[str, Where, Where]]:
     if layout.boom is not None:
         yield "boom", layout.boom.top, BOOM_TIP
     for law in layout.pair_laws:
-        if law.group == "net":
-            for first, second in law.bodies.tolist():
-                yield (
-                    ("net", OnBody(second), HUB) if first == FREE
-                    else ("net", OnBody(first), OnBody(second))
-                )  # fmt: skip
+        for first, second in law.bodies.tolist():
+            yield law.group, OnBody(second), HUB if first == FREE else OnBody(first)
 
 
 def _group(layout: Layout, body: int) -> str:
@@ -226,11 +224,13 @@ def _place(layout: Layout, where: Where) -> Array:
 
 
 def _opened(layout: Layout, opening: JointOpening, angle: float) -> Array:
-    """Where a joint between two rods of one length stands at an opening angle (rad): (3,), m."""
+    """Where a joint between two rods of one length stands at an opening angle (rad): (3,), m; one
+    on a body as the body does.
+    """
     joint = layout.joints[opening.joint]
     first, second = joint.first, joint.second
-    assert isinstance(first, OnRod)
-    assert isinstance(second, OnRod)
+    if not isinstance(first, OnRod) or not isinstance(second, OnRod):
+        return layout.pose(second).place
     rod, other = layout.rods[first.rod], layout.rods[second.rod]
     start, end = rod.start.place, other.end.place
     chord = (end - start) / np.linalg.norm(end - start)

@@ -11,7 +11,7 @@ from ringsim.analysis.design import any_finite
 from ringsim.choice import load_package
 from ringsim.files import writing
 from ringsim.plots import style
-from ringsim.plots.registry import NO_JOINTS, Picture, jointed, known
+from ringsim.plots.registry import NO_JOINTS, Picture, barred, jointed, known
 
 load_package("ringsim.plots")
 PICTURES = tuple(sorted(known.values(), key=lambda each: (each.of, each.place)))
@@ -44,7 +44,8 @@ def left_out(dataset: xr.Dataset) -> str:
     """The figures that are not drawn although their numbers are recorded, and why; or nothing."""
     names = [
         each.name for each in PICTURES
-        if each.applies is jointed and _recorded(dataset, each) and not jointed(dataset)
+        if each.applies in (jointed, barred) and _recorded(dataset, each)
+        and not each.applies(dataset)
     ]  # fmt: skip
     return f"not drawn: {', '.join(names)}: {NO_JOINTS}" if names else ""
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import xarray as xr
 from matplotlib.figure import Figure
 
+from ringsim.layout.bodies import JointOpening, OnRod
 from ringsim.layout.layout import layout_of
-from ringsim.layout.points import points_of
 from ringsim.plots import style
 from ringsim.scene import scene_from_toml
 
@@ -55,11 +55,21 @@ def picture(
 
 
 def jointed(dataset: xr.Dataset) -> bool:
-    """Whether the structure has joints that open between two rods, by its layout."""
-    return _jointed(str(dataset.attrs.get("scene", "")))
+    """Whether the structure has joints that open, by its layout."""
+    return _openings(str(dataset.attrs.get("scene", "")))[0]
+
+
+def barred(dataset: xr.Dataset) -> bool:
+    """Whether joints open between two rods each, as folding bars do, along which cables run."""
+    return _openings(str(dataset.attrs.get("scene", "")))[1]
 
 
 @functools.lru_cache(maxsize=8)
-def _jointed(scene: str) -> bool:
+def _openings(scene: str) -> tuple[bool, bool]:
     layout = layout_of(scene_from_toml(scene, source="attribute scene"))
-    return points_of(layout).openings.size > 0
+    joints = [
+        layout.joints[one.joint]
+        for plane in layout.openings for one in plane if isinstance(one, JointOpening)
+    ]  # fmt: skip
+    sides = (side for joint in joints for side in (joint.first, joint.second))
+    return bool(joints), bool(joints) and all(isinstance(side, OnRod) for side in sides)

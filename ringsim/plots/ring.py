@@ -45,6 +45,8 @@ LOOKS: dict[str, dict[str, Any]] = {
     "net, taut": {"color": style.GREEN, "linewidth": 0.9},
     "net, slack": {"color": style.GREEN, "linewidth": 0.9, "linestyle": (0, (1.5, 2.5))},
 }
+OTHER: dict[str, Any] = {"color": style.GREY, "linewidth": 1.2}
+"""Parts of structures that have more than the ring."""
 
 
 @picture("run", 50, "The structure stowed, half-way and deployed", ("opening_angle",), jointed)
@@ -79,7 +81,8 @@ def ring(dataset: xr.Dataset, states: int = 3) -> Figure:
         _caption(axes, middles[number], *moments[number])
     _scale_bar(axes, _WIDTH / scale, height)
     drawn = {name for names, _, _ in shots for name in names}
-    looks = [{"label": name} | look for name, look in LOOKS.items() if name in drawn]
+    known = LOOKS | dict.fromkeys(sorted(drawn - LOOKS.keys()), OTHER)
+    looks = [{"label": name} | look for name, look in known.items() if name in drawn]
     looks = [look | {"linestyle": "none"} if "marker" in look else look for look in looks]
     entries = [Line2D([], [], **look) for look in looks]
     figure.legend(handles=entries, loc="lower center", ncols=len(entries))
@@ -211,7 +214,7 @@ def _shot(
 def _draw(axes: Axes, names: list[str], lines: Array, near: Array, scale: float) -> None:
     """Lines, the far ones paler; thinner where a metre is short."""
     thin = float(np.clip(scale / 1.3, 0.45, 1.0))
-    looks = [LOOKS[name] for name in names]
+    looks = [LOOKS.get(name, OTHER) for name in names]
     depth = max(float(np.ptp(near)), 0.8 * float(np.ptp(lines[..., 0])))
     fade = (_FADE * (near.max() - near) / depth)[:, None]
     colours = np.array([to_rgb(look["color"]) for look in looks])

@@ -17,7 +17,7 @@ from ringsim.layout.bodies import JointOpening, OnRod
 from ringsim.layout.layout import layout_of
 from ringsim.plots import style
 from ringsim.plots.peaks import mark, peak_of
-from ringsim.plots.registry import jointed, picture
+from ringsim.plots.registry import barred, jointed, picture
 from ringsim.scene import Scene, scene_from_toml
 
 # Stress in the rods over time.
@@ -259,7 +259,7 @@ def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
     return found
 
 
-@picture("run", 60, "Spans and tensions of the cables", ("cable_tension", "rope_strain"), jointed)
+@picture("run", 60, "Spans and tensions of the cables", ("cable_tension", "rope_strain"), barred)
 def cables(dataset: xr.Dataset) -> Figure:
     """Neutral lengths, elongations, decays and tensions, section by section.
 
@@ -317,7 +317,7 @@ _LINES = ((style.BLUE, "-"), (style.ORANGE, "-"), (style.GREEN, (0, (5, 3))))
 """Both hinge pulleys of a section between others are alike."""
 
 
-@picture("run", 70, "What the pulleys pass on", ("pulley_ratio", "opening_angle"), jointed)
+@picture("run", 70, "What the pulleys pass on", ("pulley_ratio", "opening_angle"), barred)
 def pulleys(dataset: xr.Dataset) -> Figure:
     """``pulley_ratio`` (plane, pulley, time), three curves a section (paper 000, figs 6 and 7).
 
@@ -354,7 +354,7 @@ def pulleys(dataset: xr.Dataset) -> Figure:
 _DRAWN = ("along", "inwards")
 
 
-@picture("run", 80, "Forces on the pulleys", ("cable_tension", "opening_angle"), jointed)
+@picture("run", 80, "Forces on the pulleys", ("cable_tension", "opening_angle"), barred)
 def nodal_forces(dataset: xr.Dataset) -> Figure:
     """Components of the force on the pulleys of every section (paper 000, figs 9 and 10).
 
