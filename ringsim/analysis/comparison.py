@@ -38,7 +38,6 @@ from ringsim.analysis.requirements import (
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import NOTE, losses, marked
 from ringsim.refusal import InputError
-from ringsim.stepping.instant import Array
 from ringsim.tables import Table, interval_text, number_text, slim
 
 # What shares of two campaigns ended how, and kept to what is required: their differences.
@@ -324,8 +323,8 @@ def _output(
         if len(apart):
             worst = int(np.abs(apart).argmax())
             largest, where = apart[worst], int(index[0][pairs.first][known][worst])
-        if certain and len(apart) > 1:
-            ends = _interval(apart, placed[0].replicate_of(index[0][pairs.first][known]))
+        if certain:
+            ends = placed[0].interval(apart, index[0][pairs.first][known], np.mean)
     else:
         there = [np.isfinite(each) for each in values]
         used = [each[k] for each, k in zip(values, there, strict=True)]
@@ -364,12 +363,6 @@ def _output(
             | {"units": "1"},
         )  # fmt: skip
     return found
-
-
-def _interval(apart: Array, replicate: Indices | None) -> tuple[Any, Any]:
-    if replicate is None:
-        return intervals.of_independent(apart, np.mean)
-    return intervals.of_replicates(apart, replicate, np.mean)
 
 
 def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any]:

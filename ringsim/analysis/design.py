@@ -5,7 +5,7 @@ import hashlib
 import json
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.intervals import good, numbers, standard_error, used
+from ringsim.analysis import intervals
+from ringsim.analysis.intervals import NONE, Interval, good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
@@ -101,6 +102,28 @@ class Placement:
     def replicate_of(self, samples: NDArray[np.int64]) -> NDArray[np.int64] | None:
         """The replicate of each sample; None if all samples are independent."""
         return None if self.independent else samples // self.block % self.replicates
+
+    def interval(
+        self, values: Array, samples: NDArray[np.int64], of: Callable[..., Any] | float
+    ) -> Interval:
+        """Interval of 95 % of these samples' mean or ``spread``, or of a quantile if ``of`` is its
+        probability, as the design allows it; shapes (n,).
+        """
+        if not self.has_intervals or len(values) < 2:
+            return NONE
+        replicate = self.replicate_of(samples)
+        ends: tuple[Any, Any]
+        if callable(of):
+            ends = (
+                intervals.of_independent(values, of)
+                if replicate is None
+                else intervals.of_replicates(values, replicate, of)
+            )
+        elif replicate is None:
+            ends = intervals.quantile_of_independent(values, of)
+        else:
+            ends = intervals.quantile_of_replicates(values, replicate, of)
+        return float(ends[0]), float(ends[1])
 
     def error_of_mean(self, values: Array, samples: NDArray[np.int64]) -> float:
         """Standard error of the mean of these samples' values, in their unit, shapes (n,); NaN

@@ -1,7 +1,7 @@
 """What the samples of a campaign say about its population: estimates, intervals, verdicts."""
 
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -253,26 +253,10 @@ def estimates(values: Array, placed: Placement) -> Array:
 
 def interval_of(values: Array, samples: NDArray[np.int64], placed: Placement) -> Array:
     """Intervals of all statistics as the design allows them, shape (statistic, 2)."""
-    found: dict[str, Any] = dict.fromkeys(STATISTICS, NONE)
-    if placed.has_intervals and len(values) > 1:
-        moments: dict[str, Callable[..., Any]] = {
-            "mean": np.mean,
-            "standard_deviation": intervals.spread,
-        }
-        replicate = placed.replicate_of(samples)
-        for name, statistic in moments.items():
-            found[name] = (
-                intervals.of_independent(values, statistic)
-                if replicate is None
-                else intervals.of_replicates(values, replicate, statistic)
-            )
-        for name, level in QUANTILES.items():
-            found[name] = (
-                intervals.quantile_of_independent(values, level)
-                if replicate is None
-                else intervals.quantile_of_replicates(values, replicate, level)
-            )
-    return np.array([*found.values()], dtype=float)
+    of: dict[str, Any] = {"mean": np.mean, "standard_deviation": intervals.spread, **QUANTILES}
+    return np.array([
+        placed.interval(values, samples, of[name]) if name in of else NONE for name in STATISTICS
+    ])  # fmt: skip
 
 
 def _errors(

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from scipy.stats import t
 
-from ringsim.analysis import intervals
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import (
     Interval,
@@ -349,22 +348,9 @@ def _half_width(condition: Condition, campaign: xr.Dataset, placed: Placement) -
     """Half the length of the interval of a mean or a quantile; NaN if there is none."""
     values = numbers(campaign, str(condition.of))
     known = good(campaign) & np.isfinite(values)
-    if known.sum() < 2 or not placed.has_intervals:
-        return float("nan")
-    used, replicate = values[known], placed.replicate_of(campaign["sample"].to_numpy()[known])
-    if condition.quantile is None:
-        low, high = (
-            intervals.of_independent(used, np.mean)
-            if replicate is None
-            else intervals.of_replicates(used, replicate, np.mean)
-        )
-    else:
-        low, high = (
-            intervals.quantile_of_independent(used, condition.quantile)
-            if replicate is None
-            else intervals.quantile_of_replicates(used, replicate, condition.quantile)
-        )
-    return float(high - low) / 2
+    of = np.mean if condition.quantile is None else condition.quantile
+    low, high = placed.interval(values[known], campaign["sample"].to_numpy()[known], of)
+    return (high - low) / 2
 
 
 def stopping_lines(campaign: xr.Dataset, placed: Placement) -> list[str]:

@@ -26,8 +26,6 @@ from ringsim.analysis.design import (
 from ringsim.analysis.intervals import (
     good,
     numbers,
-    of_independent,
-    of_replicates,
     quantile,
     ran,
     tells_of,
@@ -164,16 +162,12 @@ def band(
     shape (counts, 2); only counts that have one, with two samples of each replicate at least.
     """
     counts, replicate = _counts(len(values), _INTERVALS), placed.replicate_of(samples)
-    if not placed.has_intervals:
-        return counts[:0], np.empty((0, 2))
-    if replicate is None:
-        ends = np.array([of_independent(values[:n], np.mean) for n in counts])
-    else:
+    if replicate is not None:
         size = placed.replicates
         told_twice = [np.bincount(replicate[:n], minlength=size).min() >= 2 for n in counts]
         counts = counts[told_twice]
-        ends = np.array([of_replicates(values[:n], replicate[:n], np.mean) for n in counts])
-    ends = ends.reshape(-1, 2)
+    found = [placed.interval(values[:n], samples[:n], np.mean) for n in counts]
+    ends = np.array(found).reshape(-1, 2)
     known = np.isfinite(ends).all(axis=1)
     return counts[known], ends[known]
 
