@@ -100,13 +100,12 @@ class Ring:
         """
         import pandas as pd
 
-        from ringsim.analysis.design import population_of, requirements_of
-        from ringsim.analysis.requirements import read_requirements
+        from ringsim.analysis.design import population_of
+        from ringsim.analysis.requirements import required_by
         from ringsim.analysis.worst import COLUMNS, command, worst
 
         self._require_samples("worst samples")
-        wanted = read_requirements(requirements_of(self._dataset), "requirements")
-        found = worst(population_of(self._dataset), wanted)
+        found = worst(population_of(self._dataset), required_by(self._dataset.attrs))
         columns: dict[str, Any] = {
             name: found[f"worst_{name}"].to_numpy() if found else [] for name in COLUMNS
         }

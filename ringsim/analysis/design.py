@@ -198,7 +198,7 @@ _EFFORT = ("wall_time",)
 LOST = "lost: "
 """How the words begin for what became of a run whose numbers do not hold."""
 UNKNOWN, NOT_RUN = "unknown", "not run"
-REACHED = tuple(fate.word.replace("_", " ") for fate in GOALS)
+REACHED = tuple(fate.words for fate in GOALS)
 """What became of those that reached their goal."""
 
 
@@ -224,8 +224,9 @@ def endings_of(status: NDArray[Any], fates: NDArray[Any]) -> NDArray[np.str_]:
 def _word(code: int, fate: int) -> str:
     if code < 0:
         return NOT_RUN
-    word = f"{LOST}{Status(code).word}" if Status(code).failed else Fate(fate).word
-    return UNKNOWN if word == Fate.NONE.word else word.replace("_", " ")
+    if Status(code).failed:
+        return f"{LOST}{Status(code).words}"
+    return UNKNOWN if fate == Fate.NONE else Fate(fate).words
 
 
 def kinds_of_ends(words: NDArray[np.str_]) -> list[str]:
@@ -316,11 +317,6 @@ def paths_of(variable: xr.DataArray) -> list[str]:
 def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
     """The tables of the campaign's file, which the dataset keeps as text."""
     return tomllib.loads(str(campaign.attrs.get("campaign", "")))
-
-
-def requirements_of(campaign: xr.Dataset) -> dict[str, dict[str, Any]]:
-    """What the campaign requires of its numbers: tables with min, max or is, by name."""
-    return dict(json.loads(campaign.attrs.get("requirements", "{}")))
 
 
 def distribution_of(variable: xr.DataArray) -> dict[str, Any]:

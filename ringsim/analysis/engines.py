@@ -15,9 +15,6 @@ from ringsim.outputs.family import Array
 from ringsim.tables import counted, text_table
 from ringsim.variables import GOALS, Fate, Outcome, Status
 
-# How far the answers of the frame engine and of the full one are apart, output by output.
-
-
 _NOT_CHECKED = -1
 _NAMED = 6
 

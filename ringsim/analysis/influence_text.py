@@ -13,7 +13,7 @@ from ringsim.analysis.influence import confounding_notes, partners
 from ringsim.analysis.intervals import LEVEL, quantities
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table, counted, interval_text, number_text
+from ringsim.tables import Table, chance_text, counted, interval_text, number_text
 
 # Every measure: the largest rank correlations, indices and areas of each output.
 
@@ -193,7 +193,7 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
             outputs.setdefault((count, failed, chance), []).append(output)
     for (count, failed, chance), names in outputs.items():
         who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
-        p = f"p = {chance:.2g}" if chance else "p < 0.0001"
+        p = chance_text(chance)
         if chance < UNLIKELY:
             cures = ["require or analyse the outcome instead"] * (failed < count)
             if failed:  # what did not fail has no value because of what the antenna did

@@ -43,7 +43,7 @@ from ringsim.sampling.distributions import Discrete, Distribution, inside
 from ringsim.sampling.table import AnyDistribution
 from ringsim.stepping.instant import Array
 from ringsim.units import Model
-from ringsim.variables import flags_of
+from ringsim.variables import about, flags_of
 
 # Estimates from samples with weights, and their intervals.
 
@@ -429,19 +429,17 @@ def reweight(
             _told(values[known], weights[known], level, placed, placed.replicate_of(index[known]))
             for level in REWEIGHTED_STATISTICS.values()
         ])  # fmt: skip
-        about = {"long_name": f"reweighted estimates of: {name}", "units": variable.units}
-        found[f"{name}_reweighted"] = "reweighted_statistic", rows[:, 0], about
+        says = about(f"reweighted estimates of: {name}", variable.units)
+        found[f"{name}_reweighted"] = "reweighted_statistic", rows[:, 0], says
         found[f"{name}_reweighted_interval"] = (
-            ("reweighted_statistic", "bound"),
-            rows[:, 1:3],
-            about,
-        )
+            ("reweighted_statistic", "bound"), rows[:, 1:3], says,
+        )  # fmt: skip
         found[f"{name}_decisive_samples"] = (
             "reweighted_statistic", rows[:, 3],
-            {"long_name": "effective samples that decide each estimate", "units": "1"},
+            about("effective samples that decide each estimate"),
         )  # fmt: skip
         found[f"{name}_effective_samples"] = (
-            (), effective(weights[known]), {"long_name": "effective samples", "units": "1"}
+            (), effective(weights[known]), about("effective samples"),
         )  # fmt: skip
     cap, shares, words = None, list[tuple[float, ...]](), list[str]()
     for word, (own, of) in _events(campaign, requirements, ok, gone).items():
@@ -456,18 +454,15 @@ def reweight(
         words.append(word)
         shares.append((share, *ends, decisive))
     told = np.array(shares).reshape(-1, 4)
-    about = {"long_name": "share if inputs had the other distributions", "units": "1"}
-    found["reweighted_share"] = "event", told[:, 0], about
-    found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:3], about
+    says = about("share if inputs had the other distributions")
+    found["reweighted_share"] = "event", told[:, 0], says
+    found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:3], says
     found["reweighted_share_decisive"] = (
-        "event", told[:, 3],
-        {"long_name": "effective samples of the event, or of the others if fewer", "units": "1"},
+        "event", told[:, 3], about("effective samples of the event, or of the others if fewer"),
     )  # fmt: skip
     if requirements and ok.any():
         found |= _verdicts(campaign, requirements, placed, weights, pairs)
-    found["effective_samples"] = (
-        (), count, {"long_name": "effective samples of all that ran", "units": "1"}
-    )  # fmt: skip
+    found["effective_samples"] = (), count, about("effective samples of all that ran")
     found["reweighted_samples"] = (), int(run.sum()), {"long_name": "samples that ran"}
     laws = {
         path: {"kind": kind_of(law), **law.model_dump(exclude_defaults=True)}
@@ -515,17 +510,15 @@ def _verdicts(
         verdict = verdict_of(*ends, wanted.probability)
         rows.append((verdict, mean((~broken[held]).astype(float), weights[held]), *ends))
     told = np.array(rows)
-    about = "probability to keep to it if inputs had the other distributions"
+    words = "probability to keep to it if inputs had the other distributions"
     return {
         "reweighted_verdict": (
             "requirement", told[:, 0].astype("i1"),
-            {"long_name": "verdict if inputs had the other distributions", "units": "1"}
-            | flags_of(Verdict),
+            about("verdict if inputs had the other distributions") | flags_of(Verdict),
         ),
-        "reweighted_probability": ("requirement", told[:, 1], {"long_name": about, "units": "1"}),
+        "reweighted_probability": ("requirement", told[:, 1], about(words)),
         "reweighted_bounds": (
-            ("requirement", "bound"), told[:, 2:],
-            {"long_name": f"one-sided bounds of the {about}", "units": "1"},
+            ("requirement", "bound"), told[:, 2:], about(f"one-sided bounds of the {words}"),
         ),
     }  # fmt: skip
 

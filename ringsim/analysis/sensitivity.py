@@ -18,6 +18,7 @@ from ringsim.analysis.influence import groups_of
 from ringsim.analysis.intervals import good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import Requirement
 from ringsim.stepping.instant import Array
+from ringsim.variables import about
 
 _LEAST_OF_A_KIND = 10
 """Samples that failed, and that did not, below which failure is no output to analyse."""
@@ -120,15 +121,15 @@ def sensitivity(
     coords = {"input": inputs.names} if blocks is None else {"factor": blocks.groups}
     made = _dataset(outputs, found, coords, block is not None)
     of = "samples" if block is None else "blocks"
-    for k, (name, about) in enumerate({
+    for k, (name, words) in enumerate({
         "index_used": f"{of} that indices are from",
         "index_lost": f"{of} that are left out, because a sample of them has no value",
         "missing": f"samples of {count} that have run without a value",
         "missing_lost": "of these, samples whose run failed",
     }.items()):  # fmt: skip
-        made[name] = "output", counts[:, k], {"long_name": about, "units": "1"}
-    about = "probability that samples missing at random go with inputs as much"
-    made["missing_by_inputs"] = "output", chance, {"long_name": about, "units": "1"}
+        made[name] = "output", counts[:, k], about(words)
+    words = "probability that samples missing at random go with inputs as much"
+    made["missing_by_inputs"] = "output", chance, about(words)
     return made
 
 

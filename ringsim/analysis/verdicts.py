@@ -28,9 +28,9 @@ from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, 
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
 from ringsim.refusal import known_or_nearest
-from ringsim.tables import counted, number_text
+from ringsim.tables import counted, number_text, with_unit
 from ringsim.units import Model
-from ringsim.variables import GOALS, Code, Fate, flags_of
+from ringsim.variables import GOALS, Code, Fate, about, flags_of
 
 # When a campaign may stop: the conditions, the looks at them, and how looks share an error.
 #
@@ -221,9 +221,8 @@ def judge(
         for key, value in _judged(campaign, name, wanted, placed, rule).items():
             columns[key].append(value)
     known = {
-        name: ("requirement", values, {"long_name": words, "units": "1"})
-        for name, (words, _) in _MEANING.items()
-        for values in [np.array(columns[name], dtype=_MEANING[name][1])]
+        name: ("requirement", np.array(columns[name], dtype=kind), about(words))
+        for name, (words, kind) in _MEANING.items()
     }
     told = [each.told(name) for name, each in requirements.items()]
     found = xr.Dataset(known, coords={"requirement": np.array([*requirements], dtype=object)})
@@ -331,14 +330,13 @@ def holds(
             wanted = {each.requirement: requirements[each.requirement]}
             (code,) = judge(campaign, wanted, placed)["verdict"].to_numpy().tolist()
             shown = code in (Verdict.MET, Verdict.NOT_MET)
-            word = Verdict(code).word.replace("_", " ")
-            told.append(f"{wanted[each.requirement].told(each.requirement)} is {word}")
+            what = wanted[each.requirement].told(each.requirement)
+            told.append(f"{what} is {Verdict(code).words}")
         else:
-            half, shown = _half_width(each, campaign, placed), False
-            units = quantities()[str(each.of)].units
-            unit = "" if units == "1" else f" {units}"
+            half = _half_width(each, campaign, placed)
             shown = half <= float(each.half_width or 0.0)
-            told.append(f"the {each.what} is known to {number_text(half, 3)}{unit}")
+            known = with_unit(number_text(half, 3), quantities()[str(each.of)].units)
+            told.append(f"the {each.what} is known to {known}")
         if not shown:
             return ""
     return ", ".join(told)

@@ -1,6 +1,5 @@
 """``ringsim merge``, ``analyse``, ``report``, ``plot``, ``compare`` and ``export``."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,6 @@ from ringsim.campaign.stopping import as_decided, merge
 from ringsim.cli.options import ANIMATE, COLOUR, FOLDER, PATH, PLOT_FORMAT, listed, require_animate
 from ringsim.files import require_place, writing
 from ringsim.refusal import InputError, known_or_nearest
-
-# Opening what verbs are called for: a folder that is not merged yet is merged first.
 
 
 def opened(path: Path) -> xr.Dataset:
@@ -39,9 +36,6 @@ def opened(path: Path) -> xr.Dataset:
     return open_stored(path)
 
 
-# ``ringsim merge``: put the results of a campaign into one file.
-
-
 @click.command()
 @FOLDER
 def merge_command(folder: Path) -> None:
@@ -59,9 +53,6 @@ def merge_command(folder: Path) -> None:
         with xr.open_dataset(path) as dataset:
             for line in [*notes(dataset), *check_lines(dataset), *verdict_lines(dataset)]:
                 click.echo(f"  {line}")
-
-
-# ``ringsim analyse DIR|FILE``.
 
 
 @click.command()
@@ -92,7 +83,7 @@ def analyse_command(
 
     Exit codes: 0 done, whatever the verdicts; 2 bad input.
     """
-    from ringsim.analysis.requirements import parse_requirements, read_requirements
+    from ringsim.analysis.requirements import parse_requirements, required_by
     from ringsim.analysis.reweighting import parse_reweighted
     from ringsim.analysis.study import analyse
     from ringsim.analysis.study_text import told
@@ -103,10 +94,8 @@ def analyse_command(
     if out is not None:
         require_file(out)
     with opened(source) as campaign:
-        own = json.loads(campaign.attrs.get("requirements", "{}"))
         try:
-            judged = {**read_requirements(own, "requirements"), **wanted}
-            found = analyse(campaign, judged, others)
+            found = analyse(campaign, required_by(campaign.attrs) | wanted, others)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
     folder = source if source.is_dir() else source.parent
@@ -115,9 +104,6 @@ def analyse_command(
     if out is not None:
         save(found, out)
         click.echo(f"wrote {out}")
-
-
-# ``ringsim report``: a campaign as one page.
 
 
 @click.command()
@@ -168,9 +154,6 @@ def _load(file: Path) -> Any:
         raise InputError(
             f"{file}: cannot be read as a netCDF file: {reason}; merge again, or give another one"
         ) from None
-
-
-# ``ringsim plot FILE``.
 
 
 @click.command()
@@ -240,9 +223,6 @@ def _shown(dataset: Any, sample: int | None, file: Path) -> tuple[Any, str]:
     return dataset.sel(sample=sample), f"{file.stem}-sample{sample}"
 
 
-# ``ringsim compare A B``.
-
-
 @click.command()
 @click.argument("first", type=PATH)
 @click.argument("second", type=PATH)
@@ -267,9 +247,6 @@ def compare_command(first: Path, second: Path, out: Path | None) -> None:
     if out is not None:
         save(found, out)
         click.echo(f"wrote {out}")
-
-
-# ``ringsim export``: results for other programs.
 
 
 FORMATS = ("csv", "mat", "pvd")

@@ -26,6 +26,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from matplotlib.transforms import Bbox
 from PIL import Image
 
+from ringsim.tables import unit_behind
 from ringsim.variables import Fate, Status
 
 # Words inside axes, put where they cover no curve.
@@ -132,7 +133,7 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     words = str(variable.attrs.get("long_name", variable.name))
     units = str(variable.attrs.get("units", "1")) if units is None else units
     words = words[:1].upper() + words[1:]
-    return textwrap.fill(words if units == "1" else f"{words} ({units})", width)
+    return textwrap.fill(unit_behind(words, units), width)
 
 
 def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
@@ -162,7 +163,7 @@ def deployment_time(dataset: xr.Dataset) -> float:
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
     status, fate = Status(int(dataset["status"])), Fate(int(dataset.get("outcome", Fate.NONE)))
-    word = (status if status.failed else fate).word.replace("_", " ")
+    word = (status if status.failed else fate).words
     if fate == Fate.DEPLOYED and math.isfinite(deployed := deployment_time(dataset)):
         return f"Deployed after {deployed:.2f} s"
     final = float(dataset.get("final_time", math.nan))

@@ -42,7 +42,7 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
     for all that ended in the same way.
     """
     words, goals = endings(campaign), (*REACHED, UNKNOWN, NOT_RUN)
-    causes = {int(cause): cause.word.replace("_", " ") for cause in Cause if cause}
+    causes = {int(cause): cause.words for cause in Cause if cause}
     codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
     alike: dict[tuple[str, str, str], list[int]] = {}
     for place, sample in enumerate(campaign["sample"].values.tolist()):

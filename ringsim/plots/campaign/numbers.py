@@ -18,37 +18,20 @@ from ringsim.analysis.design import (
     inputs,
     judged_by,
     placement,
-    requirements_of,
     scalars,
     told,
     values_of,
 )
-from ringsim.analysis.intervals import (
-    good,
-    numbers,
-    quantile,
-    ran,
-    tells_of,
-)
-from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements, violations
+from ringsim.analysis.intervals import good, numbers, quantile, ran, tells_of
+from ringsim.analysis.requirements import OUTCOME, Requirement, required_by, violations
 from ringsim.analysis.tails import approach, subset_simulation, tail
 from ringsim.analysis.verdicts import judge
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import (
-    WIDE,
-    head,
-    in_lines,
-    legend,
-    limits,
-    looks_of,
-    standing,
-)
+from ringsim.plots.campaign.frame import WIDE, head, in_lines, legend, limits, looks_of, standing
 from ringsim.plots.campaign.tornado import is_one_by_one
 from ringsim.plots.registry import picture
-
-# Cumulative distribution of the main numbers, with the limits that the campaign sets them.
-
+from ringsim.tables import unit_behind
 
 _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
@@ -131,9 +114,6 @@ def distributions(campaign: xr.Dataset) -> Figure:
     return figure
 
 
-# Main numbers and probabilities of requirements, as samples come in.
-
-
 _POINTS = 400
 _INTERVALS = 20
 """Points of the band: each costs a bootstrap."""
@@ -188,9 +168,8 @@ def judged(
 
 def _required(campaign: xr.Dataset) -> Mapping[str, Requirement]:
     """The requirements that samples can be judged by."""
-    wanted = read_requirements(requirements_of(campaign), "requirements")
     return {
-        name: each for name, each in wanted.items()
+        name: each for name, each in required_by(campaign.attrs).items()
         if name in campaign and (name == OUTCOME or tells_of(campaign, name)[good(campaign)].all())
     }  # fmt: skip
 
@@ -250,9 +229,6 @@ def _named(axes: Axes, words: str, count: int) -> None:
     axes.set_title(f"{words}\nn = {count}", fontsize=9.5, color=style.INK)
     axes.set_xlabel("Samples")
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
-
-
-# What becomes of a sample, by each of its drawn inputs.
 
 
 _MANY = 500
@@ -333,16 +309,11 @@ def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
 
 def _label(variable: xr.DataArray) -> str:
     units = str(variable.attrs.get("units", "1"))
-    words = called(variable)
-    what = ", mean" if variable.ndim > 1 else ""
-    what += "" if units == "1" else f" ({units})"
-    words = in_lines(words)
+    words = in_lines(called(variable))
+    what = unit_behind(", mean" if variable.ndim > 1 else "", units)
     if len(words.rpartition("\n")[2]) + len(what) > WIDE:
         what = "\n" + what.lstrip(", ")
     return words + what
-
-
-# How a campaign of subset simulation came to its rare event.
 
 
 @picture(
