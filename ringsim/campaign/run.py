@@ -44,8 +44,6 @@ from ringsim.storage.netcdf import DESIGN, reserved
 from ringsim.storage.result import Result, check_of, sample_of
 from ringsim.variables import GOALS, Fate, Status
 
-# Running a campaign: run what is missing in its folder, merge, say how it ended.
-
 
 @dataclass(frozen=True)
 class Share:

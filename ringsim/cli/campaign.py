@@ -16,8 +16,6 @@ from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.storage.merge import NAME as MERGED
 
-# ``ringsim campaign``: run a campaign, or finish an interrupted one.
-
 
 @click.command()
 @click.argument("file", type=PATH)
@@ -87,9 +85,6 @@ def campaign_command(
     if ended.first:
         click.echo(str(ended.refused), err=True)
     return EXIT_BAD_INPUT
-
-
-# ``ringsim status``: how far a campaign is.
 
 
 @click.command()

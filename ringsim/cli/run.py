@@ -69,9 +69,6 @@ def watched(run: Callable[[Scene, Watch | None], Outcome], scene: Scene) -> Outc
         return run(scene, None if bar.disable else show)
 
 
-# ``ringsim run SCENE``.
-
-
 class _Fidelity(click.Choice[str]):
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         """Refuse what there was with what to do."""
@@ -252,9 +249,6 @@ def _with_accuracy(
     click.echo(f"settings for {accuracy:g}: fidelity = {picked.fidelity}, {words}")
     click.echo(f"  measured with {known.scene} to be good for: {errors}")
     return scene.with_values(values), picked.fidelity
-
-
-# ``ringsim replay``: run one sample of a campaign again, in the foreground.
 
 
 Arrays = dict[str, NDArray[Any]]

@@ -28,9 +28,6 @@ from ringsim.tables import text_table
 from ringsim.units import Model
 from ringsim.variables import Variable
 
-# ``ringsim scenes``: what is built in, and its text as a starting point.
-
-
 SCHEMA = "scene.schema.json"
 """File beside a scene that editors check it by."""
 
@@ -82,9 +79,6 @@ def _write_with_schema(text: str, out: Path) -> None:
     ):
         write_text(path, content)
         click.echo(f"wrote {path}")
-
-
-# ``ringsim check``: validate a scene and say what it builds.
 
 
 _ASKED = ("margin", "hinge_spring", "temperature")
@@ -314,9 +308,6 @@ def _verdict(least: Margin) -> str:
         return "nothing resists"
     word = "enough" if least.margin >= 0.0 else "NOT enough"
     return f"least margin {least.margin:.3f} at {math.degrees(least.angle):.2f} deg: {word}"
-
-
-# ``ringsim explain``: what results, scenes and campaigns hold.
 
 
 def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:

@@ -14,8 +14,6 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import write_text
 from ringsim.scene import load_scene
 
-# ``ringsim accuracy SCENE``.
-
 
 @click.command()
 @SCENE
@@ -83,9 +81,6 @@ def accuracy_command(
     for name in ("accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"):
         click.echo(f"wrote {folder / name}")
     return EXIT_DONE
-
-
-# ``ringsim stability SCENE``: where the solver is sound, and how it ends where it is not.
 
 
 @click.command()

@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots import style as free_labels
 
 
 class Peak(NamedTuple):
@@ -73,7 +72,7 @@ def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) ->
     height = factor * peak.value
     axes.plot(peak.time, height, "o", color=style.VERMILLION, markersize=6, zorder=4, clip_on=False)
     early = peak.time < 0.5 * sum(axes.get_xlim())
-    free_labels.free(axes.text(
+    style.free(axes.text(
         0.98 if early else 0.02, 0.95 if early else 0.82,
         f"largest: {height:.3g} {units} at {peak.time:.4g} s\n{place}", transform=axes.transAxes,
         va="top", ha="right" if early else "left", color=style.VERMILLION, bbox=style.PAPER,

@@ -22,9 +22,6 @@ from ringsim.plots.registry import jointed, picture
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import Shape, Track, places_at, shape_of
 
-# The ring in space: stowed, between and deployed.
-
-
 Array = NDArray[np.float64]
 
 _ELEVATION = 24.0

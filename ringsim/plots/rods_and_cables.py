@@ -20,9 +20,6 @@ from ringsim.plots.peaks import mark, peak_of
 from ringsim.plots.registry import jointed, picture
 from ringsim.scene import Scene, scene_from_toml
 
-# Stress in the rods over time.
-
-
 _COLOURS = (style.INK, "#d00000", style.BLUE, style.GREEN, style.ORANGE, style.PURPLE)
 _HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
 
@@ -222,9 +219,6 @@ def pulley_forces(dataset: xr.Dataset, plane: str) -> xr.DataArray:
     return xr.DataArray(found, coordinates, dims, "nodal_force", words)
 
 
-# Spans and tensions of a cable over time.
-
-
 def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
     """A cable's quantities by section over time from a recorded run of a ring.
 
@@ -309,9 +303,6 @@ def cables(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-# How much of the tension every pulley passes on, over time.
-
-
 _SECTIONS = 4
 _LINES = ((style.BLUE, "-"), (style.ORANGE, "-"), (style.GREEN, (0, (5, 3))))
 """Both hinge pulleys of a section between others are alike."""
@@ -346,9 +337,6 @@ def pulleys(dataset: xr.Dataset) -> Figure:
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
     style.head(figure, grid[0, 0], dataset, "Pulleys")
     return figure
-
-
-# Forces of the cables on the pulleys of every section over time.
 
 
 _DRAWN = ("along", "inwards")
@@ -387,9 +375,6 @@ def nodal_forces(dataset: xr.Dataset) -> Figure:
     style.name_sections(figure, grid[0, 0], sections)
     style.head(figure, grid[0, 0], dataset, "Forces on the pulleys")
     return figure
-
-
-# Resistance by kind against the drive, and the margin, over the opening angle.
 
 
 _SOURCES = (

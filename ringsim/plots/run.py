@@ -16,9 +16,6 @@ from ringsim.plots import style
 from ringsim.plots.peaks import label_of, mark, peak_of
 from ringsim.plots.registry import jointed, picture
 
-# Opening angles of all V-joints over time.
-
-
 LEAST_SPAN = 0.01
 """Smallest range (degree) of the axis of deviations, so that round-off is not magnified."""
 
@@ -104,9 +101,6 @@ def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray) -> N
     grid[1, 0].set_ylim(-span, span)
 
 
-# Asynchrony of the sections over time.
-
-
 _CLOSE = (0.02, 0.5)
 """Least and largest share of the run that the enlarged end shows: fewer records are a few straight
 lines, and more is what the whole run shows as well."""
@@ -166,9 +160,6 @@ def _last_seconds(dataset: xr.Dataset, end: float, peak: float) -> tuple[float, 
     return end - length, max(end, np.nan_to_num(style.deployment_time(dataset))) + 0.05 * length
 
 
-# Work, energies and energy balance of a run over time.
-
-
 _LOOKS = {
     "work": (style.INK, "-"),
     "kinetic_energy": (style.BLUE, "-"),
@@ -215,9 +206,6 @@ def imbalance(dataset: xr.Dataset) -> xr.DataArray:
     lack = dataset["work"] - dataset["dissipation"] - stored
     first = lack.dropna("time")[:1].sum()
     return (lack - first).assign_attrs(units=dataset["work"].attrs["units"])
-
-
-# Which section is ahead and which behind, over time.
 
 
 _TRIANGLE: dict[str, Any] = {

@@ -155,9 +155,6 @@ def inside(probability: Array) -> Array:
     return np.clip(probability, 2.0**-54, 1.0 - 2.0**-53)
 
 
-# A finite set of values.
-
-
 class Discrete(Distribution):
     """Each of the values with its probability; all alike if none are given.
 
@@ -231,9 +228,6 @@ class Discrete(Distribution):
         return middle
 
 
-# Normal distribution.
-
-
 class Normal(Continuous):
     """Density exp(-(x - mean)^2 / (2 s^2)) / (s sqrt(2 pi)), s the standard deviation.
 
@@ -261,9 +255,6 @@ class Normal(Continuous):
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
         return float(ndtr((value - self.mean) / self.standard_deviation))
-
-
-# Lognormal distribution.
 
 
 class Lognormal(Continuous):
@@ -301,9 +292,6 @@ class Lognormal(Continuous):
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
         return self._logarithm.probability(math.log(value)) if value > 0.0 else 0.0
-
-
-# A continuous distribution cut off at one or both ends.
 
 
 LEAST_MASS = 1e-6
@@ -366,9 +354,6 @@ class Truncated(Distribution):
         values = self.of.quantile(below + (above - below) * probability)
         clipped: Values = np.clip(values, self.low, self.high)
         return clipped
-
-
-# Uniform distribution.
 
 
 class Uniform(Continuous):

@@ -16,9 +16,6 @@ from ringsim.plots.campaign.frame import head
 from ringsim.plots.registry import picture
 from ringsim.plots.run import LEAST_SPAN
 
-# How far each section is ahead or behind, over all samples.
-
-
 _NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")
 """Asynchrony first: without a value of it there is nothing to draw."""
 _LOOKS = ((style.BLUE, "solid", 1.9), (style.ORANGE, (0, (3, 1.5)), 1.2))
@@ -101,9 +98,6 @@ def _limits(drawn: list[xr.DataArray], sections: slice) -> tuple[float, float]:
     return low - air, high + air
 
 
-# Section by time: the lag of the median over the samples, and of the worst sample.
-
-
 @picture(
     "campaign", 60, "Section by time: lag of the median and of the worst sample",
     _NEEDS, judged_by, courses,
@@ -143,9 +137,6 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     figure.supylabel(style.label(campaign["section"]), fontsize=10.5)
     head(figure, campaign, "Lag map", f"{told(campaign, len(read.samples))}.")
     return figure
-
-
-# Which V-joints lock first and last, and which never.
 
 
 def locks_of(campaign: xr.Dataset) -> Array:
