@@ -38,12 +38,16 @@ class Peak(NamedTuple):
         return np.insert(times, at, self.time), np.insert(heights, at, factor * self.value)
 
 
-def peak_of(dataset: xr.Dataset, series: str, value: str, stem: str, until: float) -> Peak:
+def peak_of(
+    dataset: xr.Dataset, series: str, value: str, until: float = math.inf, stem: str = ""
+) -> Peak:
     """The largest of a variable over (..., time), at any step of a run up to a time in s.
 
-    ``value`` names the number that holds it; ``STEM_time`` and ``STEM_DIM`` are when and where.
-    What a dataset lacks of these is that of the largest record nearby.
+    ``value`` names the number that holds it; ``STEM_time`` and ``STEM_DIM`` are when and where,
+    the stem being its name if none is given.  What a dataset lacks of these is that of the largest
+    record nearby.
     """
+    stem = stem or value
     records = dataset[series].where(dataset["time"] <= until)
     time = float(dataset.get(f"{stem}_time", math.nan))
     after = int(np.searchsorted(records["time"].values, time))

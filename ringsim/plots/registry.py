@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -60,6 +60,6 @@ def jointed(dataset: xr.Dataset) -> bool:
 
 
 @functools.lru_cache(maxsize=8)
-def _jointed(scene: Any) -> bool:
+def _jointed(scene: str) -> bool:
     layout = layout_of(scene_from_toml(scene, source="attribute scene"))
     return points_of(layout).openings.size > 0

@@ -115,7 +115,7 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     values = dataset["asynchrony"].dropna("time")
     moving = values[~(values["time"].values > style.deployment_time(dataset))]
     end = float(moving["time"][-1])
-    peak = peak_of(dataset, "asynchrony", "asynchrony_max", "asynchrony_max", end)
+    peak = peak_of(dataset, "asynchrony", "asynchrony_max", end)
     times, heights = peak.within(moving)
     figure = Figure(figsize=(10.2, 4.3))
     whole, close = figure.subplots(1, 2, width_ratios=(3, 2))
@@ -222,28 +222,21 @@ def section_map(dataset: xr.Dataset) -> Figure:
     farthest apart when ``asynchrony`` is largest, which may be between two records.
     """
     found = deviations(dataset).transpose("plane", "section", "time")
-    times, sections = found["time"].values, found["section"].values
-    planes = found["plane"].values.tolist()
+    sections, planes = found["section"].values, found["plane"].values.tolist()
     span = max(style.largest_magnitude(found), LEAST_SPAN)
-    peak = peak_of(dataset, "asynchrony", "asynchrony_max", "asynchrony_max", times[-1])
+    peak = peak_of(dataset, "asynchrony", "asynchrony_max", found["time"].values[-1])
     leader, laggard = apart(dataset, peak.time)
     locked = "lock_time" in dataset and bool(np.isfinite(dataset["lock_time"]).any())
     figure = Figure(figsize=(8.8, 2.7 * len(planes) + 0.9))
     grid = figure.subplots(len(planes), 1, sharex=True, squeeze=False)[:, 0]
-    middles = 0.5 * (times[1:] + times[:-1])
-    edges = np.concatenate([times[:1], middles, times[-1:]])
     for axes, plane in zip(grid, planes, strict=True):
-        image = axes.pcolormesh(
-            edges, np.append(sections, sections[-1] + 1) - 0.5, found.sel(plane=plane).values,
-            cmap="PuOr_r", vmin=-span, vmax=span, rasterized=True,
-        )  # fmt: skip
+        image = style.lag_image(axes, found.sel(plane=plane), span)
         marks = [(leader, "^"), (laggard, "v")]
         for section, marker in ((one[1], marker) for one, marker in marks if one[0] == plane):
             axes.plot(peak.time, section, marker, **_TRIANGLE)
         locks = dataset["lock_time"].sel(plane=plane).dropna("section") if locked else found[:0]
         if locks.size:  # a line without points would stand in the corner of the sheet
             axes.plot(locks, locks["section"], "o", **_DOT)
-        axes.grid(visible=False)
         axes.yaxis.set_major_locator(MaxNLocator(10, integer=True, min_n_ticks=1))
         axes.set_ylim(sections[0] - 0.5, sections[-1] + 0.5)
         axes.set_ylabel(f"{plane} plane")

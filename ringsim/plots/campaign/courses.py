@@ -12,7 +12,7 @@ from ringsim.analysis.design import judged_by, median_and_worst, told
 from ringsim.analysis.intervals import good
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import head
+from ringsim.plots.campaign.frame import head, legend
 from ringsim.plots.registry import picture
 from ringsim.plots.run import LEAST_SPAN
 
@@ -114,20 +114,13 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     if chosen is not None and chosen[1] in read.samples:
         one = course(campaign, chosen[1], found)
         columns.append((f"worst: sample {chosen[1]}", one))
-    planes, sections = found["plane"].values.tolist(), found["section"].values
+    planes = found["plane"].values.tolist()
     figure = Figure(figsize=(4.9 * len(columns), 2.2 * len(planes) + 1.3))
     grid = figure.subplots(len(planes), len(columns), sharex=True, sharey=True, squeeze=False)
-    time = found["time"].values
-    edges = np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
     span = max(LEAST_SPAN, *(style.largest_magnitude(values) for _, values in columns))
     for (name, values), axes_of in zip(columns, grid.T, strict=True):
         for plane, axes in zip(planes, axes_of, strict=True):
-            image = axes.pcolormesh(
-                edges, np.append(sections, sections[-1] + 1) - 0.5,
-                values.sel(plane=plane).transpose("section", "time").values,
-                cmap="PuOr_r", vmin=-span, vmax=span, rasterized=True,
-            )  # fmt: skip
-            axes.grid(visible=False)
+            image = style.lag_image(axes, values.sel(plane=plane), span)
             axes.set_title(f"{plane} plane, {name}", fontsize=9.5)
         axes_of[-1].set_xlabel(style.label(found["time"], width=44))
     bar = figure.colorbar(image, ax=grid.ravel().tolist(), pad=0.015)
@@ -192,8 +185,7 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     grid[-1].set_xlabel(style.label(campaign["section"]))
     grid[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     figure.supylabel("Share of the samples", fontsize=10.5)
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    legend(figure, [grid[0]])
     locks = locks_of(campaign)
     done = int(np.isfinite(locks).all(axis=(1, 2)).sum())
     head(
