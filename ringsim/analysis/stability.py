@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ringsim.analysis.engines import held
 from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
-from ringsim.tables import markdown_table, unit_behind
+from ringsim.tables import counted, markdown_table, unit_behind
 from ringsim.variables import GOALS, Cause, Fate, Status
 
 # Where the engines differ in a stability map: cells with another end, or with other values.
@@ -274,7 +274,7 @@ def summary(whole: xr.Dataset) -> str:
     ends = ", ".join(f"{count} {word}" for count, word in zip(counts, words, strict=True))
     anew = int(np.sum((whole["restarts"].values > 0) & (verdict == OK)))
     minutes = float(whole["cpu_time"].sum()) / 60.0
-    panels = f"{whole.sizes['group']} panel{'s' if whole.sizes['group'] > 1 else ''}"
+    panels = counted(whole.sizes["group"], "panel")
     return (
         f"{len(verdict)} cells in {panels}: {ends}; {anew} of the ok ones after "
         f"a new start with smaller steps; {minutes:.1f} minutes of processor time"
