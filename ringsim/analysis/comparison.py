@@ -22,7 +22,6 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.requirements import (
     OUTCOME,
-    Requirement,
     require_values,
     required_by,
     violations,
@@ -78,7 +77,7 @@ def has_means(both: Both, placed: Placements, pairs: int) -> bool:
     """Whether means and shares are told: of populations, and of pairs of grids and lists; not of
     subset simulation, whose levels are neither.
     """
-    if any(subset_simulation(each) is not None for each in both):
+    if any(subset_simulation(each.attrs) is not None for each in both):
         return False
     return pairs > 0 or all(each.population for each in placed)
 
@@ -91,16 +90,13 @@ def _kept(both: Both, held: tuple[Mask, Mask]) -> dict[str, Event]:
         if name not in other or wanted.told(name) != other[name].told(name):
             continue
         try:
-            first, second = (_keeping(each, name, wanted) for each in both)
+            for each in both:
+                require_values(each, name)
         except InputError:  # the file of one does not tell it
             continue
+        first, second = (good(each) & ~violations(each, name, wanted) for each in both)
         found[wanted.told(name)] = Event((first, second), held)
     return found
-
-
-def _keeping(campaign: xr.Dataset, name: str, wanted: Requirement) -> Mask:
-    require_values(campaign, name)
-    return good(campaign) & ~violations(campaign, name, wanted)
 
 
 def _told(
@@ -205,7 +201,8 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
     placed = placement(one), placement(other)
     notes = {side: losses(each).note for side, each in zip(SIDES, (one, other), strict=True)}
     one, other = population_of(one), population_of(other)
-    pairs = _alone() if single else paired(one, other)
+    first_alone = np.zeros(1, dtype=np.int64)
+    pairs = Pairs(first_alone, first_alone, "two runs") if single else paired(one, other)
     found = xr.Dataset(
         coords={"side": list(SIDES), "bound": ["lower", "upper"]},
         attrs={
@@ -238,10 +235,6 @@ def _numbered(dataset: xr.Dataset) -> xr.Dataset:
     return scalars.expand_dims(sample=[0])
 
 
-def _alone() -> Pairs:
-    return Pairs(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64), "two runs")
-
-
 def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
     """Pairs of samples with equal seeds in equal designs, else of samples with equal inputs.
 
@@ -256,7 +249,7 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
     ]  # fmt: skip
     designs = [(each.kind, each.replicates) for each in map(placement, (first, second))]
     seeds = "sample_seed"
-    grows = subset_simulation(first) is not None
+    grows = subset_simulation(first.attrs) is not None
     if designs[0] == designs[1] and not grows and seeds in first and seeds in second:
         keys = [list(each[seeds].to_numpy().tolist()) for each in (first, second)]
         if (found := _matched(*keys))[0].size:

@@ -171,7 +171,7 @@ def influence(
     of these, and for its places by these.
     """
     inputs = drawn(campaign)
-    if not inputs.names or subset_simulation(campaign) is not None:
+    if not inputs.names or subset_simulation(campaign.attrs) is not None:
         return xr.Dataset()
     found: dict[str, Any] = {}
     index, ok = campaign["sample"].to_numpy(), good(campaign)

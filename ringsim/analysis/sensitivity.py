@@ -82,7 +82,8 @@ def sensitivity(
         for name, each in responses(campaign, requirements).items()
         if names is None or name in names or name not in quantities()
     }
-    if not outputs or not inputs.names or (blocks is None and not _plain(placed)):
+    plain = placed.population and placed.block == 1
+    if not outputs or not inputs.names or (blocks is None and not plain):
         return xr.Dataset()
     size = 1 if blocks is None else blocks.size
     # Blocks count, or samples, all of which have run.
@@ -131,10 +132,6 @@ def sensitivity(
     words = "probability that samples missing at random go with inputs as much"
     made["missing_by_inputs"] = "output", chance, about(words)
     return made
-
-
-def _plain(placed: Placement) -> bool:
-    return placed.population and placed.block == 1
 
 
 def _sobol(values: Array, blocks: Blocks, replicate: NDArray[np.int64], *, binary: bool) -> Found:

@@ -145,16 +145,9 @@ def _bent(found: xr.Dataset) -> list[str]:
     Verdicts, their bounds and shares of outcomes count lost runs, and counts are what they are.
     """
     of_all = (
-        "verdict",
-        "outcome",
-        "tail",
-        "samples",
-        "missing",
-        "group",
-        "index_used",
-        "index_lost",
+        "verdict", "outcome", "tail", "samples", "missing", "group", "index_used", "index_lost",
         "balance",
-    )
+    )  # fmt: skip
     safe = ("_samples", "_lower", "_upper", "_required", "_bounds", "_verdict", "_text", "_units")
     return [
         str(name) for name, each in found.data_vars.items()

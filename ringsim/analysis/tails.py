@@ -1,6 +1,7 @@
 """How probable a rare event is, by a campaign of subset simulation."""
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,9 @@ DISAGREE = 0.01
 """Probability below which replicates scatter by more than their chains explain."""
 
 
-def subset_simulation(campaign: xr.Dataset) -> SubsetSimulation | None:
-    """The design of a campaign if it is subset simulation, else None."""
-    table = json.loads(campaign.attrs.get("design", "{}"))
+def subset_simulation(attributes: Mapping[Any, Any]) -> SubsetSimulation | None:
+    """The design that a campaign keeps if it is subset simulation, else None."""
+    table = json.loads(attributes.get("design", "{}"))
     if table.get("kind") != "subset-simulation":
         return None
     return SubsetSimulation.model_validate(table)
@@ -43,7 +44,7 @@ def approach(campaign: xr.Dataset) -> list[tuple[Array, Array]]:
     """Of each replicate the values of the output that its levels reached, the event's last, with
     the probability to be beyond each; what has no probability yet is left out.
     """
-    if (design := subset_simulation(campaign)) is None:
+    if (design := subset_simulation(campaign.attrs)) is None:
         return []
     found = []
     for one in design.levels(_responses(campaign, design)).repetitions:
@@ -101,7 +102,7 @@ def replicated_interval(each: Array, chains: Array, most: float = 1.0) -> tuple[
 
 def tail(campaign: xr.Dataset) -> dict[str, Any]:
     """Variables ``tail_...`` of a campaign of subset simulation; none of other campaigns."""
-    if (design := subset_simulation(campaign)) is None:
+    if (design := subset_simulation(campaign.attrs)) is None:
         return {}
     known = _responses(campaign, design)
     found = design.levels(known)
@@ -191,12 +192,9 @@ def _short(
 
 
 def _checks(
-    campaign: xr.Dataset,
-    design: SubsetSimulation,
-    known: Array,
-    found: list[Repetition],
+    campaign: xr.Dataset, design: SubsetSimulation, known: Array, found: list[Repetition],
     units: str,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """What the runs repeated with the full engine say, and the probability with the limit moved by
     what the engines differ at most: nearer, and farther.
     """

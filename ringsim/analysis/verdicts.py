@@ -130,8 +130,6 @@ class Rule(Model):
         """
         if not self.judges(name):
             return wanted.confidence, wanted.confidence
-        from ringsim.analysis.intervals import samples_needed  # scipy.stats takes half a second
-
         needed = samples_needed(0, wanted.probability, wanted.confidence)
         # A campaign that ends between two looks has the part of the one to come.
         upper = [*self.numbers(samples, replicates), samples]
@@ -142,8 +140,6 @@ class Rule(Model):
         self, name: str, wanted: Requirement, samples: int, violations: int, replicates: int = 1
     ) -> int:
         """How many samples without a violation after so many would show it at a look."""
-        from ringsim.analysis.intervals import samples_needed
-
         least = samples_needed(violations, wanted.probability, wanted.confidence)
         for count in self.looks.numbers(replicates):
             if count > samples and count >= least:

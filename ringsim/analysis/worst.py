@@ -298,7 +298,7 @@ def losses(campaign: xr.Dataset) -> Losses:
     """The lost runs of a merged campaign; subset simulation takes them as no event, and says so."""
     run, gone = ran(campaign), lost(campaign)
     count, chance = int(gone.sum()), np.nan
-    if count and subset_simulation(campaign) is None:
+    if count and subset_simulation(campaign.attrs) is None:
         blocks, block = blocks_of(campaign), None
         if blocks is not None:
             block = np.unique(np.arange(len(run))[run] // blocks.size, return_inverse=True)[1]

@@ -14,7 +14,7 @@ import xarray as xr
 
 from ringsim.analysis.design import placement
 from ringsim.analysis.requirements import OUTCOME, required_by
-from ringsim.analysis.verdicts import Rule, rule_of
+from ringsim.analysis.verdicts import Rule, holds, rule_of
 from ringsim.campaign.folder import Folder
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError
@@ -89,8 +89,6 @@ class _Judge:
         """What shows that the samples of a look are enough, "" if they are not; None if some of
         them, or of their checks, have not run.
         """
-        from ringsim.analysis.verdicts import holds  # scipy.stats takes half a second
-
         first = self._campaign.first(count)
         found = first.survey()
         if len(found.missing) or len(first.unchecked()):

@@ -38,9 +38,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     found = read.bands
     planes, sections = found["plane"].values.tolist(), found["section"].values.tolist()
     looks = dict(zip(planes, _LOOKS, strict=False))
-    chosen = median_and_worst(campaign)
-    worst = chosen[1] if chosen is not None and chosen[1] in read.samples else None
-    one = None if worst is None else course(campaign, worst, found)
+    worst, one = _worst(campaign, read)
     columns = min(_WIDEST, len(sections))
     rows = -(-len(sections) // columns)
     figure = Figure(figsize=(max(1.75 * columns, 7.0), max(1.75 * rows, 2.4) + 1.7))
@@ -90,6 +88,14 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     return figure
 
 
+def _worst(campaign: xr.Dataset, read: Courses) -> tuple[int, xr.DataArray | None]:
+    """The sample with the largest asynchrony and its course; none if that was not recorded."""
+    chosen = median_and_worst(campaign)
+    if chosen is None or chosen[1] not in read.samples:
+        return -1, None
+    return chosen[1], course(campaign, chosen[1], read.bands)
+
+
 def _limits(drawn: list[xr.DataArray], sections: slice) -> tuple[float, float]:
     """What the curves of these sections need, and some air."""
     ends = [np.nan_to_num(each.isel(section=sections).values) for each in drawn]
@@ -109,11 +115,10 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     """
     read = courses(campaign) if read is None else read
     found = read.bands
-    chosen = median_and_worst(campaign)
+    worst, one = _worst(campaign, read)
     columns = [("median of all samples", read.median)]
-    if chosen is not None and chosen[1] in read.samples:
-        one = course(campaign, chosen[1], found)
-        columns.append((f"worst: sample {chosen[1]}", one))
+    if one is not None:
+        columns.append((f"worst: sample {worst}", one))
     planes = found["plane"].values.tolist()
     figure = Figure(figsize=(4.9 * len(columns), 2.2 * len(planes) + 1.3))
     grid = figure.subplots(len(planes), len(columns), sharex=True, sharey=True, squeeze=False)
@@ -188,10 +193,6 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     legend(figure, [grid[0]])
     locks = locks_of(campaign)
     done = int(np.isfinite(locks).all(axis=(1, 2)).sum())
-    head(
-        figure,
-        campaign,
-        "Lock order",
-        f"{told(campaign, len(locks))}; all V-joints lock in {done}, only these have a last one.",
-    )
+    note = f"all V-joints lock in {done}, only these have a last one."
+    head(figure, campaign, "Lock order", f"{told(campaign, len(locks))}; {note}")
     return figure

@@ -247,12 +247,8 @@ def tension(campaign: xr.Dataset) -> Figure:
                      fontsize=10.5)  # fmt: skip
     legend(figure, [grid[0]], 4)
     counted = int(np.isfinite(found.to_numpy()).any(axis=(1, 2)).sum())
-    head(
-        figure,
-        campaign,
-        "Tension along the cables",
-        f"{told(campaign, counted)}. At recorded times until the last lock.",
-    )
+    note = f"{told(campaign, counted)}. At recorded times until the last lock."
+    head(figure, campaign, "Tension along the cables", note)
     return figure
 
 

@@ -101,16 +101,12 @@ def distributions(campaign: xr.Dataset) -> Figure:
             axes.set_ylabel("Samples at or below")
     most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
     notes = f" Dots: quantiles of 5, 50 and 95 %.{blocks}"
-    ends = (
-        " Where a curve ends below 100 %, it did not happen in the other samples: they count in "
-        "shares and dots, and violate limits."
-    )
-    head(
-        figure,
-        campaign,
-        "Distributions",
-        f"{told(campaign, most)}.{notes}{ends if short else ''}",
-    )
+    if short:
+        notes += (
+            " Where a curve ends below 100 %, it did not happen in the other samples: they count "
+            "in shares and dots, and violate limits."
+        )
+    head(figure, campaign, "Distributions", f"{told(campaign, most)}.{notes}")
     return figure
 
 
@@ -323,7 +319,7 @@ def rare_event(campaign: xr.Dataset) -> Figure:
     """Probability to be at or beyond the values that levels reached, a line a replicate; the
     event's own with its interval.
     """
-    design, found = subset_simulation(campaign), tail(campaign)
+    design, found = subset_simulation(campaign.attrs), tail(campaign)
     assert design is not None
     figure = Figure(figsize=(8.0, 4.6))
     axes = figure.subplots()

@@ -156,7 +156,7 @@ def explained(campaign: xr.Dataset) -> bool:
     """
     known = [values_of(campaign, name)[1] for name in scalars(campaign)]
     varied = any(len(values) >= LEAST and np.ptp(values) > 0 for values in known)
-    return varied and bool(drawn(campaign).names) and subset_simulation(campaign) is None
+    return varied and bool(drawn(campaign).names) and subset_simulation(campaign.attrs) is None
 
 
 @picture(
@@ -335,8 +335,6 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     panels[-1].set_xlim(-0.7, len(samples) - 0.3)
     legend(figure, [panels[0]], 4)
     counted = max(len(values_of(campaign, name)[0]) for name in names)
-    head(
-        figure, campaign, "One at a time",
-        f"{told(campaign, counted)}. Line: the first sample, the base case.",
-    )  # fmt: skip
+    note = f"{told(campaign, counted)}. Line: the first sample, the base case."
+    head(figure, campaign, "One at a time", note)
     return figure
