@@ -35,11 +35,9 @@ SCHEMA = "scene.schema.json"
 @click.command()
 @click.argument("name", required=False)
 @click.option(
-    "--out",
-    metavar="FILE",
-    type=PATH,
+    "--out", metavar="FILE", type=PATH,
     help="Write it to this file, and a schema for editors beside it.",
-)
+)  # fmt: skip
 def scenes_command(name: str | None, out: Path | None) -> None:
     """List the built-in scenes, or print the TOML of one.
 
