@@ -52,14 +52,10 @@ class Ring:
 
         self._require_samples("outcomes")
         found = outcomes(self._dataset, placement(self._dataset))
-        ends = found["outcome_share_interval"]
-        table: dict[str, Any] = {
-            "samples": found["outcome_samples"], "of": found["outcome_of"],
-            "lost": found["outcome_lost"], "share": found["outcome_share"],
-            "lower": ends[:, 0], "upper": ends[:, 1],
-        }  # fmt: skip
-        rows = xr.Dataset({k: ("kind", v.to_numpy()) for k, v in table.items()},
-                          coords={"kind": found["kind"]}).to_dataframe()  # fmt: skip
+        columns = ("samples", "of", "lost", "share")
+        known = found[[f"outcome_{name}" for name in columns]]
+        rows = known.to_dataframe().set_axis(columns, axis=1)
+        rows[["lower", "upper"]] = found["outcome_share_interval"].to_numpy()
         rows.attrs |= self._losses()
         return rows
 
@@ -142,9 +138,8 @@ class Ring:
         from ringsim.analysis.worst import NOTE, losses
 
         dataset = self._dataset
-        note = (
-            losses(dataset).note if {"sample"} <= set(dataset.dims) and "status" in dataset else ""
-        )
+        campaign = "sample" in dataset.dims and "status" in dataset
+        note = losses(dataset).note if campaign else ""
         return {NOTE: note} if note else {}
 
     def _require_samples(self, what: str) -> None:

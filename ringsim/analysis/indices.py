@@ -160,7 +160,7 @@ def area_interval(found: Array, inside: int, outside: int) -> tuple[Array, Array
 
 def replicate_interval(
     measure: Callable[[NDArray[np.bool_]], Array], replicate: NDArray[np.int64],
-    to: Callable[[Array], Array], back: Callable[[Array], Array], level: float = LEVEL,
+    to: Callable[[Array], Array], back: Callable[[Array], Array],
 ) -> tuple[Array, Array]:  # fmt: skip
     """Intervals of a measure from independent replicates of a design, see ``of_replicates``.
 
@@ -172,7 +172,7 @@ def replicate_interval(
     if len(which) < 2:
         return centre + np.nan, centre + np.nan
     error = jackknife_error(np.array([to(measure(replicate != each)) for each in which]))
-    half = student(len(which), level) * error
+    half = student(len(which)) * error
     return back(centre - half), back(centre + half)
 
 

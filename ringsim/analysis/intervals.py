@@ -207,9 +207,9 @@ def jackknife_error(left_out: Array) -> Array:
     return np.asarray(np.sqrt(squares * (len(left_out) - 1) / len(left_out)))
 
 
-def student(replicates: int, level: float = LEVEL) -> float:
+def student(replicates: int) -> float:
     """Half length of an interval over the standard error from so many replicates."""
-    return float(t.ppf(0.5 + level / 2, replicates - 1)) if replicates > 1 else np.nan
+    return float(t.ppf(0.5 + LEVEL / 2, replicates - 1)) if replicates > 1 else np.nan
 
 
 def quantile_of_replicates(
@@ -268,9 +268,9 @@ def of_difference(
 # Arithmetic of shares: intervals of one, exact, and of differences; samples that are needed.
 
 
-def share_interval(count: int, samples: int, level: float = LEVEL) -> Interval:
+def share_interval(count: int, samples: int) -> Interval:
     """Two-sided exact interval of a share.  Source: Clopper and Pearson, Biometrika 26 (1934)."""
-    low, high = binomtest(count, samples).proportion_ci(level, method="exact")
+    low, high = binomtest(count, samples).proportion_ci(LEVEL, method="exact")
     return float(low), float(high)
 
 

@@ -76,9 +76,7 @@ def mean(values: Array, weights: Array) -> float:
     return float(weights @ values / weights.sum())
 
 
-def mean_interval(
-    values: Array, weights: Array, replicate: Replicate, level: float = LEVEL
-) -> Interval:
+def mean_interval(values: Array, weights: Array, replicate: Replicate) -> Interval:
     """Interval of the weighted mean, with Student's t.
 
     Of independent samples by the linearised variance of a ratio, with one degree of freedom less
@@ -89,13 +87,13 @@ def mean_interval(
     if replicate is not None:
         low, high = replicate_interval(
             lambda rows: np.array(mean(values[rows], weights[rows])), replicate,
-            np.asarray, np.asarray, level,
+            np.asarray, np.asarray,
         )  # fmt: skip
         return float(low), float(high)
     free = effective(weights) - 1
     if free < 1:
         return NONE
-    half = float(t.ppf(0.5 + level / 2, free)) * _error(values, weights, centre)
+    half = float(t.ppf(0.5 + LEVEL / 2, free)) * _error(values, weights, centre)
     return centre - half, centre + half
 
 
@@ -106,9 +104,7 @@ def _error(values: Array, weights: Array, centre: float) -> float:
     return float(np.sqrt(squares * (1 + 1 / free)) / weights.sum())
 
 
-def share_interval(
-    own: Mask, weights: Array, replicate: Replicate, level: float = LEVEL
-) -> Interval:
+def share_interval(own: Mask, weights: Array, replicate: Replicate) -> Interval:
     """Interval of the weighted share of some samples.
 
     The exact one for as many samples as would have that standard error; where none or all are of
@@ -117,7 +113,7 @@ def share_interval(
     share, few = mean(own.astype(float), weights), min(own.sum(), (~own).sum()) < _FEW
     share = 1.0 if own.all() else share  # not a bit less by round-off
     if replicate is not None and not few:
-        low, high = mean_interval(own.astype(float), weights, replicate, level)
+        low, high = mean_interval(own.astype(float), weights, replicate)
         return max(0.0, low), min(1.0, high)
     count = effective(weights)
     if count <= 2:
@@ -126,9 +122,9 @@ def share_interval(
         error = _error(own.astype(float), weights, share)
         count = share * (1 - share) / error**2
         # Fewer degrees of freedom than the count tells: t instead of the normal distribution.
-        wide = t.ppf(0.5 + level / 2, [len(own) - 1, max(effective(weights) - 1, 1)])
+        wide = t.ppf(0.5 + LEVEL / 2, [len(own) - 1, max(effective(weights) - 1, 1)])
         count *= float(wide[0] / wide[1]) ** 2
-    hits, tail = share * count, (1 - level) / 2
+    hits, tail = share * count, (1 - LEVEL) / 2
     low = beta.ppf(tail, hits, count - hits + 1) if share > 0 else 0.0
     high = beta.ppf(1 - tail, hits + 1, count - hits) if share < 1 else 1.0
     return float(low), float(high)
