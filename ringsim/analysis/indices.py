@@ -79,8 +79,7 @@ def partial_correlations(x: Array, output: Array) -> Array:
     if np.linalg.cond(matrix) > 1e10:
         return none
     inverse = np.linalg.inv(matrix)
-    found: Array = -inverse[:-1, -1] / np.sqrt(np.diag(inverse)[:-1] * inverse[-1, -1])
-    return found
+    return np.asarray(-inverse[:-1, -1] / np.sqrt(np.diag(inverse)[:-1] * inverse[-1, -1]))
 
 
 def areas(columns: Array, group: NDArray[np.bool_]) -> Array:
@@ -91,8 +90,7 @@ def areas(columns: Array, group: NDArray[np.bool_]) -> Array:
     """
     inside = int(group.sum())
     outside = len(group) - inside
-    found: Array = 0.5 + centred_ranks(columns)[group].sum(axis=0) / (inside * outside)
-    return found
+    return np.asarray(0.5 + centred_ranks(columns)[group].sum(axis=0) / (inside * outside))
 
 
 def correlation_interval(found: Array, samples: int, held: int = 0) -> tuple[Array, Array]:

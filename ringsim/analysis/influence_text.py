@@ -34,9 +34,7 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
     rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
     named = set[str]()
-    for output in quantities():
-        if f"{output}_rank_correlation" not in analysis:
-            continue
+    for output in _correlated(analysis):
         plain, partial = (
             (
                 analysis[f"{output}_{word}rank_correlation"].values,
@@ -391,12 +389,7 @@ def _cleared(
 
 
 def _correlated(analysis: xr.Dataset) -> list[str]:
-    end = "_rank_correlation"
-    return [
-        str(name).removesuffix(end)
-        for name in analysis.data_vars
-        if str(name).endswith(end) and not str(name).endswith(f"_partial{end}")
-    ]
+    return [name for name in quantities() if f"{name}_rank_correlation" in analysis]
 
 
 def _ranked(analysis: xr.Dataset, output: str) -> Iterator[tuple[str, ...]]:

@@ -134,8 +134,7 @@ class LatinHypercube(Replicated):
         """Random places within randomly permuted intervals."""
         from scipy.stats import qmc
 
-        points: Array = qmc.LatinHypercube(d=axes, rng=stream).random(samples)
-        return points
+        return np.asarray(qmc.LatinHypercube(d=axes, rng=stream).random(samples))
 
 
 class Sobol(Replicated):
@@ -167,8 +166,7 @@ def sobol_points(samples: int, axes: int, stream: np.random.Generator, *, kind: 
             "draw fewer inputs"
         )
     engine = qmc.Sobol(d=axes, scramble=True, rng=stream, bits=30)
-    points: Array = engine.random_base2((samples - 1).bit_length())[:samples]
-    return points
+    return np.asarray(engine.random_base2((samples - 1).bit_length())[:samples])
 
 
 class Listed(Design):
