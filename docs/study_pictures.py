@@ -163,7 +163,7 @@ def repetitions(campaign: xr.Dataset, limit: float) -> list[Repetition]:
     """What each replicate of a campaign of subset simulation tells of a lower limit: the same runs
     come first, whatever the limit.
     """
-    design = subset_simulation(campaign)
+    design = subset_simulation(campaign.attrs)
     assert design is not None
     known = design.responses(campaign[design.of].to_numpy(), ~good(campaign))
     of = design.levels(known).replicate[: len(known)]

@@ -79,3 +79,27 @@ def interval_text(low: float, high: float, digits: int = 4) -> str:
     """Both ends of an interval, or a dash."""
     known = math.isfinite(low) or math.isfinite(high)
     return f"{number_text(low, digits)} .. {number_text(high, digits)}" if known else "-"
+
+
+def chance_text(probability: float) -> str:
+    """A probability that is of interest if it is small, as "p = 0.03"."""
+    return f"p = {probability:.2g}" if round(probability, 4) else "p < 0.0001"
+
+
+def unit_text(units: str) -> str:
+    """A unit as a cell of a table has it: empty of numbers without one."""
+    return "" if units == "1" else units
+
+
+def with_unit(number: str, units: str) -> str:
+    """A number in words and its unit.
+
+    >>> with_unit("3.2", "N"), with_unit("3.2", "1")
+    ('3.2 N', '3.2')
+    """
+    return f"{number} {unit_text(units)}".rstrip()
+
+
+def unit_behind(words: str, units: str) -> str:
+    """What a number is, and its unit: "tension (N)"."""
+    return words if units == "1" else f"{words} ({units})"

@@ -22,6 +22,16 @@ class Code(IntEnum):
         """Lower-case name, as in the attribute ``flag_meanings``."""
         return self.name.lower()
 
+    @property
+    def words(self) -> str:
+        """The same for people, with blanks."""
+        return self.word.replace("_", " ")
+
+
+def about(long_name: str, units: str = "1") -> dict[str, Any]:
+    """The CF attributes that tell what a variable is."""
+    return {"long_name": long_name, "units": units}
+
 
 def flags_of(codes: Iterable[Code]) -> dict[str, Any]:
     """The CF attributes that tell what codes mean."""

@@ -52,14 +52,10 @@ class Ring:
 
         self._require_samples("outcomes")
         found = outcomes(self._dataset, placement(self._dataset))
-        ends = found["outcome_share_interval"]
-        table: dict[str, Any] = {
-            "samples": found["outcome_samples"], "of": found["outcome_of"],
-            "lost": found["outcome_lost"], "share": found["outcome_share"],
-            "lower": ends[:, 0], "upper": ends[:, 1],
-        }  # fmt: skip
-        rows = xr.Dataset({k: ("kind", v.to_numpy()) for k, v in table.items()},
-                          coords={"kind": found["kind"]}).to_dataframe()  # fmt: skip
+        columns = ("samples", "of", "lost", "share")
+        known = found[[f"outcome_{name}" for name in columns]]
+        rows = known.to_dataframe().set_axis(columns, axis=1)
+        rows[["lower", "upper"]] = found["outcome_share_interval"].to_numpy()
         rows.attrs |= self._losses()
         return rows
 
@@ -100,13 +96,12 @@ class Ring:
         """
         import pandas as pd
 
-        from ringsim.analysis.design import population_of, requirements_of
-        from ringsim.analysis.requirements import read_requirements
+        from ringsim.analysis.design import population_of
+        from ringsim.analysis.requirements import required_by
         from ringsim.analysis.worst import COLUMNS, command, worst
 
         self._require_samples("worst samples")
-        wanted = read_requirements(requirements_of(self._dataset), "requirements")
-        found = worst(population_of(self._dataset), wanted)
+        found = worst(population_of(self._dataset), required_by(self._dataset.attrs))
         columns: dict[str, Any] = {
             name: found[f"worst_{name}"].to_numpy() if found else [] for name in COLUMNS
         }
@@ -143,9 +138,8 @@ class Ring:
         from ringsim.analysis.worst import NOTE, losses
 
         dataset = self._dataset
-        note = (
-            losses(dataset).note if {"sample"} <= set(dataset.dims) and "status" in dataset else ""
-        )
+        campaign = "sample" in dataset.dims and "status" in dataset
+        note = losses(dataset).note if campaign else ""
         return {NOTE: note} if note else {}
 
     def _require_samples(self, what: str) -> None:

@@ -15,8 +15,6 @@ from ringsim.stepping.instant import Array
 from ringsim.tables import markdown_table
 from ringsim.variables import Status
 
-# Errors of numerical settings against a reference, their cost, and which are worth it.
-#
 # A single error may be small by chance: errors of coarse steps and of few elements have signs and
 # may cancel.  The error that a setting is good for is therefore the largest among itself and all
 # settings that are finer than it, plus the reference's own uncertainty.

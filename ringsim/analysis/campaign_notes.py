@@ -8,18 +8,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.design import (
-    LOST,
-    NOT_RUN,
-    REACHED,
-    UNKNOWN,
-    endings_of,
-    kinds_of_ends,
-)
+from ringsim.analysis.design import LOST, NOT_RUN, REACHED, UNKNOWN, endings_of, kinds_of_ends
 from ringsim.analysis.intervals import used, worst_sample
 from ringsim.analysis.worst import losses
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
+from ringsim.tables import with_unit
 from ringsim.variables import Variable
 
 _NAMED = 6
@@ -132,11 +126,11 @@ def _numerical(sound: xr.Dataset, variable: Variable, worst: xr.Dataset) -> str:
     """How large the numerical error of a sample's value is; empty if no sample tells."""
     if (name := f"{variable.name}_error") not in sound or not sound[name].notnull().any():
         return ""
-    unit = "" if variable.units == "1" else f" {variable.units}"
     if np.isfinite(own := float(worst[name])):
-        return f"; numerical error at most {own:.2g}{unit}"
+        return f"; numerical error at most {with_unit(f'{own:.2g}', variable.units)}"
     stated = sound[name].dropna("sample")
+    most = with_unit(f"{float(stated.max()):.2g}", variable.units)
     return (
-        f"; its numerical error is not stated, at most {float(stated.max()):.2g}{unit} in the "
-        f"{stated.size} samples that state theirs"
+        f"; its numerical error is not stated, at most {most} in the {stated.size} samples that "
+        "state theirs"
     )

@@ -9,15 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
-from ringsim.analysis.design import (
-    LOST,
-    Placement,
-    called,
-    endings,
-    placement,
-    population_of,
-    requirements_of,
-)
+from ringsim.analysis.design import LOST, Placement, called, endings, placement, population_of
 from ringsim.analysis.intervals import (
     NONE,
     Mask,
@@ -30,16 +22,15 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.requirements import (
     OUTCOME,
-    Requirement,
-    read_requirements,
     require_values,
+    required_by,
     violations,
 )
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import NOTE, losses, marked
 from ringsim.refusal import InputError
-from ringsim.stepping.instant import Array
-from ringsim.tables import Table, interval_text, number_text, slim
+from ringsim.tables import Table, interval_text, number_text, slim, unit_text
+from ringsim.variables import about
 
 # What shares of two campaigns ended how, and kept to what is required: their differences.
 
@@ -86,29 +77,26 @@ def has_means(both: Both, placed: Placements, pairs: int) -> bool:
     """Whether means and shares are told: of populations, and of pairs of grids and lists; not of
     subset simulation, whose levels are neither.
     """
-    if any(subset_simulation(each) is not None for each in both):
+    if any(subset_simulation(each.attrs) is not None for each in both):
         return False
     return pairs > 0 or all(each.population for each in placed)
 
 
 def _kept(both: Both, held: tuple[Mask, Mask]) -> dict[str, Event]:
     """The requirements that both campaigns have, with equal limits, and can be judged by."""
-    one, other = (read_requirements(requirements_of(each), "requirements") for each in both)
+    one, other = (required_by(each.attrs) for each in both)
     found = {}
     for name, wanted in one.items():
         if name not in other or wanted.told(name) != other[name].told(name):
             continue
         try:
-            first, second = (_keeping(each, name, wanted) for each in both)
+            for each in both:
+                require_values(each, name)
         except InputError:  # the file of one does not tell it
             continue
+        first, second = (good(each) & ~violations(each, name, wanted) for each in both)
         found[wanted.told(name)] = Event((first, second), held)
     return found
-
-
-def _keeping(campaign: xr.Dataset, name: str, wanted: Requirement) -> Mask:
-    require_values(campaign, name)
-    return good(campaign) & ~violations(campaign, name, wanted)
 
 
 def _told(
@@ -120,17 +108,16 @@ def _told(
     apart = "difference of the shares, second minus first"
     return {
         f"{word}_samples": (
-            (dim, "side"), counts.reshape(-1, 2), {"long_name": "samples of all", "units": "1"},
+            (dim, "side"), counts.reshape(-1, 2), about("samples of all"),
         ),
         f"{word}_compared": (
             (dim, "side"), numbers[:, :2].astype("i8"),
-            {"long_name": "samples compared, of which the shares are", "units": "1"},
+            about("samples compared, of which the shares are"),
         ),
-        f"{word}_share": ((dim, "side"), numbers[:, 2:4], {"long_name": "share", "units": "1"}),
-        f"{word}_share_difference": (dim, numbers[:, 4], {"long_name": apart, "units": "1"}),
+        f"{word}_share": ((dim, "side"), numbers[:, 2:4], about("share")),
+        f"{word}_share_difference": (dim, numbers[:, 4], about(apart)),
         f"{word}_share_difference_interval": (
-            (dim, "bound"), numbers[:, 5:],
-            {"long_name": f"interval of 95 % of the {apart}", "units": "1"},
+            (dim, "bound"), numbers[:, 5:], about(f"interval of 95 % of the {apart}"),
         ),
     }  # fmt: skip
 
@@ -214,7 +201,8 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
     placed = placement(one), placement(other)
     notes = {side: losses(each).note for side, each in zip(SIDES, (one, other), strict=True)}
     one, other = population_of(one), population_of(other)
-    pairs = _alone() if single else paired(one, other)
+    first_alone = np.zeros(1, dtype=np.int64)
+    pairs = Pairs(first_alone, first_alone, "two runs") if single else paired(one, other)
     found = xr.Dataset(
         coords={"side": list(SIDES), "bound": ["lower", "upper"]},
         attrs={
@@ -247,10 +235,6 @@ def _numbered(dataset: xr.Dataset) -> xr.Dataset:
     return scalars.expand_dims(sample=[0])
 
 
-def _alone() -> Pairs:
-    return Pairs(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64), "two runs")
-
-
 def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
     """Pairs of samples with equal seeds in equal designs, else of samples with equal inputs.
 
@@ -265,7 +249,7 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
     ]  # fmt: skip
     designs = [(each.kind, each.replicates) for each in map(placement, (first, second))]
     seeds = "sample_seed"
-    grows = subset_simulation(first) is not None
+    grows = subset_simulation(first.attrs) is not None
     if designs[0] == designs[1] and not grows and seeds in first and seeds in second:
         keys = [list(each[seeds].to_numpy().tolist()) for each in (first, second)]
         if (found := _matched(*keys))[0].size:
@@ -324,8 +308,8 @@ def _output(
         if len(apart):
             worst = int(np.abs(apart).argmax())
             largest, where = apart[worst], int(index[0][pairs.first][known][worst])
-        if certain and len(apart) > 1:
-            ends = _interval(apart, placed[0].replicate_of(index[0][pairs.first][known]))
+        if certain:
+            ends = placed[0].interval(apart, index[0][pairs.first][known], np.mean)
     else:
         there = [np.isfinite(each) for each in values]
         used = [each[k] for each, k in zip(values, there, strict=True)]
@@ -336,40 +320,26 @@ def _output(
             ends = intervals.of_difference(used[0], used[1], which)
     if not all(map(len, used)):
         return {}
-    about = both[0][name].attrs.get("long_name", name)
-    units = {"units": quantities()[name].units}
-
-    def told(words: str) -> dict[str, str]:
-        return units | {"long_name": f"{words}: {about}"}
-
     means = np.array([each.mean() for each in used])
     if not has_means(both, placed, len(pairs.first)):
         means = means * np.nan
-    found: dict[str, Any] = {
-        f"{name}_mean": ("side", means, told("mean of the samples compared")),
-        f"{name}_difference": ((), means[1] - means[0], told("second minus first")),
-        f"{name}_difference_interval": (
-            "bound", np.array(ends, dtype=float), told("interval of 95 % of the difference"),
-        ),
-        f"{name}_samples": (
-            "side", np.array([len(each) for each in used], dtype="i8"),
-            told("samples compared") | {"units": "1"},
-        ),
-    }  # fmt: skip
+    rows: dict[str, tuple[Any, Any, str]] = {
+        "mean": ("side", means, "mean of the samples compared"),
+        "difference": ((), means[1] - means[0], "second minus first"),
+        "difference_interval": ("bound", np.array(ends), "interval of 95 % of the difference"),
+        "samples": ("side", np.array([len(each) for each in used]), "samples compared"),
+    }
     if len(pairs.first):
-        words = "largest difference of a pair"
-        found[f"{name}_largest_difference"] = ((), largest, told(words))
-        found[f"{name}_largest_difference_sample"] = (
-            (), np.int64(where), told("sample of the first with the largest difference")
-            | {"units": "1"},
+        rows["largest_difference"] = (), largest, "largest difference of a pair"
+        rows["largest_difference_sample"] = (
+            (), np.int64(where), "sample of the first with the largest difference",
         )  # fmt: skip
+    meaning, units = both[0][name].attrs.get("long_name", name), quantities()[name].units
+    found = {}
+    for word, (dims, each, words) in rows.items():
+        unit = units if np.asarray(each).dtype.kind == "f" else "1"  # samples have none
+        found[f"{name}_{word}"] = dims, each, about(f"{words}: {meaning}", unit)
     return found
-
-
-def _interval(apart: Array, replicate: Indices | None) -> tuple[Any, Any]:
-    if replicate is None:
-        return intervals.of_independent(apart, np.mean)
-    return intervals.of_replicates(apart, replicate, np.mean)
 
 
 def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any]:
@@ -380,7 +350,7 @@ def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any
     for side, dataset, place, words in zip(SIDES, both, places, (one, other), strict=True):
         found[f"changed_sample_{side}"] = (
             "change", dataset["sample"].to_numpy()[place[changed]],
-            {"long_name": f"sample of the {side} whose outcome is another", "units": "1"},
+            about(f"sample of the {side} whose outcome is another"),
         )  # fmt: skip
         found[f"changed_outcome_{side}"] = (
             "change", words[changed].astype(object),
@@ -469,7 +439,7 @@ def _outputs(found: xr.Dataset) -> Iterator[str]:
             largest = number_text(found[f"{name}_largest_difference"].item())
             place = str(found[f"{name}_largest_difference_sample"].item())
         rows.append((
-            name, "" if variable.units == "1" else variable.units, number_text(first, fine),
+            name, unit_text(variable.units), number_text(first, fine),
             number_text(second, fine), number_text(apart),
             interval_text(*found[f"{name}_difference_interval"].values.tolist()),
             _worse(found, name),

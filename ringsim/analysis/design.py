@@ -5,7 +5,7 @@ import hashlib
 import json
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.intervals import good, numbers, standard_error, used
+from ringsim.analysis import intervals
+from ringsim.analysis.intervals import NONE, Interval, good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
@@ -102,6 +103,28 @@ class Placement:
         """The replicate of each sample; None if all samples are independent."""
         return None if self.independent else samples // self.block % self.replicates
 
+    def interval(
+        self, values: Array, samples: NDArray[np.int64], of: Callable[..., Any] | float
+    ) -> Interval:
+        """Interval of 95 % of these samples' mean or ``spread``, or of a quantile if ``of`` is its
+        probability, as the design allows it; shapes (n,).
+        """
+        if not self.has_intervals or len(values) < 2:
+            return NONE
+        replicate = self.replicate_of(samples)
+        ends: tuple[Any, Any]
+        if callable(of):
+            ends = (
+                intervals.of_independent(values, of)
+                if replicate is None
+                else intervals.of_replicates(values, replicate, of)
+            )
+        elif replicate is None:
+            ends = intervals.quantile_of_independent(values, of)
+        else:
+            ends = intervals.quantile_of_replicates(values, replicate, of)
+        return float(ends[0]), float(ends[1])
+
     def error_of_mean(self, values: Array, samples: NDArray[np.int64]) -> float:
         """Standard error of the mean of these samples' values, in their unit, shapes (n,); NaN
         where their scatter does not tell it.
@@ -175,7 +198,7 @@ _EFFORT = ("wall_time",)
 LOST = "lost: "
 """How the words begin for what became of a run whose numbers do not hold."""
 UNKNOWN, NOT_RUN = "unknown", "not run"
-REACHED = tuple(fate.word.replace("_", " ") for fate in GOALS)
+REACHED = tuple(fate.words for fate in GOALS)
 """What became of those that reached their goal."""
 
 
@@ -201,8 +224,9 @@ def endings_of(status: NDArray[Any], fates: NDArray[Any]) -> NDArray[np.str_]:
 def _word(code: int, fate: int) -> str:
     if code < 0:
         return NOT_RUN
-    word = f"{LOST}{Status(code).word}" if Status(code).failed else Fate(fate).word
-    return UNKNOWN if word == Fate.NONE.word else word.replace("_", " ")
+    if Status(code).failed:
+        return f"{LOST}{Status(code).words}"
+    return UNKNOWN if fate == Fate.NONE else Fate(fate).words
 
 
 def kinds_of_ends(words: NDArray[np.str_]) -> list[str]:
@@ -293,11 +317,6 @@ def paths_of(variable: xr.DataArray) -> list[str]:
 def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
     """The tables of the campaign's file, which the dataset keeps as text."""
     return tomllib.loads(str(campaign.attrs.get("campaign", "")))
-
-
-def requirements_of(campaign: xr.Dataset) -> dict[str, dict[str, Any]]:
-    """What the campaign requires of its numbers: tables with min, max or is, by name."""
-    return dict(json.loads(campaign.attrs.get("requirements", "{}")))
 
 
 def distribution_of(variable: xr.DataArray) -> dict[str, Any]:

@@ -15,9 +15,6 @@ from ringsim.outputs.family import Array
 from ringsim.tables import counted, text_table
 from ringsim.variables import GOALS, Fate, Outcome, Status
 
-# How far the answers of the frame engine and of the full one are apart, output by output.
-
-
 _NOT_CHECKED = -1
 _NAMED = 6
 
@@ -63,7 +60,7 @@ def differences(campaign: xr.Dataset) -> list[Difference]:
         if not np.isfinite([frame[both], full[both]]).any():
             continue
         own, theirs = (numbers(campaign, f"{name}_error{end}") for end in ("", CHECKED))
-        own, theirs = (np.where(np.isnan(x), _largest(x), x) for x in (own, theirs))
+        own, theirs = (np.where(np.isnan(x), np.fmax.reduce(x), x) for x in (own, theirs))
         bars = np.where(np.isnan(own), theirs, own) + np.where(np.isnan(theirs), own, theirs)
         every = numbers(stand, name)
         known = good(stand) & np.isfinite(every)
@@ -71,10 +68,6 @@ def differences(campaign: xr.Dataset) -> list[Difference]:
         samples = campaign["sample"].to_numpy()[both]
         found.append(Difference(name, variable.units, samples, apart, share, bars[both], error))
     return found
-
-
-def _largest(values: Array) -> float:
-    return float(np.fmax.reduce(values, initial=np.nan))
 
 
 def _apart(frame: Array, full: Array) -> tuple[Array, Array]:

@@ -79,8 +79,7 @@ def partial_correlations(x: Array, output: Array) -> Array:
     if np.linalg.cond(matrix) > 1e10:
         return none
     inverse = np.linalg.inv(matrix)
-    found: Array = -inverse[:-1, -1] / np.sqrt(np.diag(inverse)[:-1] * inverse[-1, -1])
-    return found
+    return np.asarray(-inverse[:-1, -1] / np.sqrt(np.diag(inverse)[:-1] * inverse[-1, -1]))
 
 
 def areas(columns: Array, group: NDArray[np.bool_]) -> Array:
@@ -91,8 +90,7 @@ def areas(columns: Array, group: NDArray[np.bool_]) -> Array:
     """
     inside = int(group.sum())
     outside = len(group) - inside
-    found: Array = 0.5 + centred_ranks(columns)[group].sum(axis=0) / (inside * outside)
-    return found
+    return np.asarray(0.5 + centred_ranks(columns)[group].sum(axis=0) / (inside * outside))
 
 
 def correlation_interval(found: Array, samples: int, held: int = 0) -> tuple[Array, Array]:
@@ -160,7 +158,7 @@ def area_interval(found: Array, inside: int, outside: int) -> tuple[Array, Array
 
 def replicate_interval(
     measure: Callable[[NDArray[np.bool_]], Array], replicate: NDArray[np.int64],
-    to: Callable[[Array], Array], back: Callable[[Array], Array], level: float = LEVEL,
+    to: Callable[[Array], Array], back: Callable[[Array], Array],
 ) -> tuple[Array, Array]:  # fmt: skip
     """Intervals of a measure from independent replicates of a design, see ``of_replicates``.
 
@@ -172,7 +170,7 @@ def replicate_interval(
     if len(which) < 2:
         return centre + np.nan, centre + np.nan
     error = jackknife_error(np.array([to(measure(replicate != each)) for each in which]))
-    half = student(len(which), level) * error
+    half = student(len(which)) * error
     return back(centre - half), back(centre + half)
 
 

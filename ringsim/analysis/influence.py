@@ -17,6 +17,7 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.refusal import InputError
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted
+from ringsim.variables import about
 
 # Pairs of inputs that go together, so that the effect of one may be told as the other's.
 
@@ -91,27 +92,20 @@ def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
     if not found:
         return {}
     names = np.array(inputs.names, dtype=object)
-    about = {
-        "correlation": "rank correlation of the two inputs",
-        "share": "share of the variance of one of them, in ranks, that the other explains",
-    }
-    sides = {"first": "one input of the pair", "second": "the other input of the pair"}
-    told = {"units": "1"}
-    return {
-        f"pair_{name}": (
-            "pair",
-            names[[getattr(each, name) for each in found]],
-            {"long_name": word},
-        )
-        for name, word in sides.items()
-    } | {
-        f"pair_{name}": (
-            "pair",
-            [getattr(each, name) for each in found],
-            {"long_name": word} | told,
-        )
-        for name, word in about.items()
-    }
+    columns = {
+        "first": (names[[each.first for each in found]], {"long_name": "one input of the pair"}),
+        "second": (
+            names[[each.second for each in found]], {"long_name": "the other input of the pair"},
+        ),
+        "correlation": (
+            [each.correlation for each in found], about("rank correlation of the two inputs"),
+        ),
+        "share": (
+            [each.share for each in found],
+            about("share of the variance of one of them, in ranks, that the other explains"),
+        ),
+    }  # fmt: skip
+    return {f"pair_{name}": ("pair", *each) for name, each in columns.items()}
 
 
 def partners(analysis: xr.Dataset) -> dict[str, set[str]]:
@@ -177,7 +171,7 @@ def influence(
     of these, and for its places by these.
     """
     inputs = drawn(campaign)
-    if not inputs.names or subset_simulation(campaign) is not None:
+    if not inputs.names or subset_simulation(campaign.attrs) is not None:
         return xr.Dataset()
     found: dict[str, Any] = {}
     index, ok = campaign["sample"].to_numpy(), good(campaign)
@@ -194,27 +188,25 @@ def influence(
         replicate = placed.replicate_of(index[known])
         plain, partial = _correlated(columns, values[known], inputs, placed, replicate)
         for word, (middle, ends) in {"": plain, "partial_": partial}.items():
-            about = f"{word.replace('_', ' ')}rank correlation with {name}"
-            found |= _told(f"{name}_{word}rank_correlation", middle, ends, about, ("input",))
+            words = f"{word.replace('_', ' ')}rank correlation with {name}"
+            found |= _told(f"{name}_{word}rank_correlation", middle, ends, words, ("input",))
     groups = groups_of(campaign, requirements)
     if groups:
         pairs = [_separated(inputs, own, of, index, placed) for own, of in groups.values()]
         middle, ends = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
-        about = "probability that the input is larger in the group than in the rest"
-        found |= _told("separation", middle, ends, about, ("group", "input"))
-        found["group_samples"] = (
-            "group", np.array([own.sum() for own, _ in groups.values()], dtype="i8"),
-            {"long_name": "samples of the group", "units": "1"},
-        )  # fmt: skip
+        words = "probability that the input is larger in the group than in the rest"
+        found |= _told("separation", middle, ends, words, ("group", "input"))
+        counts = np.array([own.sum() for own, _ in groups.values()], dtype="i8")
+        found["group_samples"] = "group", counts, about("samples of the group")
     if not found:
         return xr.Dataset()
     found["input_is_place"] = (
         "input", np.isin(inputs.level, ["place", "quarter"]),
-        {"long_name": "whether it is of one place, or a quarter, of many", "units": "1"},
+        about("whether it is of one place, or a quarter, of many"),
     )  # fmt: skip
     found["inputs_held"] = (
         "input", _held(np.array(inputs.level)),
-        {"long_name": "other inputs that its partial correlations hold", "units": "1"},
+        about("other inputs that its partial correlations hold"),
     )  # fmt: skip
     found |= confounded(inputs, ok)
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
@@ -224,14 +216,12 @@ def influence(
 
 
 def _told(
-    name: str, middle: Array, ends: Array, about: str, dims: tuple[str, ...]
+    name: str, middle: Array, ends: Array, words: str, dims: tuple[str, ...]
 ) -> dict[str, Any]:
     return {
-        name: (dims, middle, {"long_name": about, "units": "1"}),
-        f"{name}_interval": (
-            (*dims, "bound"), ends, {"long_name": f"interval of 95 % of: {about}", "units": "1"},
-        ),
-    }  # fmt: skip
+        name: (dims, middle, about(words)),
+        f"{name}_interval": ((*dims, "bound"), ends, about(f"interval of 95 % of: {words}")),
+    }
 
 
 def _correlated(
@@ -339,24 +329,16 @@ def over_time(run: xr.Dataset) -> xr.Dataset:
     )
     known = np.isfinite(rows).all(axis=1)
     filled = np.where(known[:, None], rows, 0.0)
-    found = {
+    joints = {
         "leader": (filled.argmax(axis=1), "V-joint that is most open"),
         "laggard": (filled.argmin(axis=1), "V-joint that is least open"),
     }
+    found = xr.Dataset(coords={"time": run["time"]})
+    for name, (joint, words) in joints.items():
+        found[name] = "time", np.where(known, names[joint], ""), {"long_name": words}
     apart = np.where(known, np.ptp(filled, axis=1), np.nan)
-    return xr.Dataset(
-        {
-            name: ("time", np.where(known, names[joint], ""), {"long_name": words})
-            for name, (joint, words) in found.items()
-        }
-        | {
-            "asynchrony": (
-                "time", apart,
-                {"long_name": "how far they are apart", "units": angles.attrs.get("units", "")},
-            )
-        },
-        coords={"time": run["time"]},
-    )  # fmt: skip
+    says = about("how far they are apart", angles.attrs.get("units", ""))
+    return found.assign(asynchrony=("time", apart, says))
 
 
 def often(campaign: xr.Dataset) -> xr.Dataset:
@@ -382,7 +364,7 @@ def often(campaign: xr.Dataset) -> xr.Dataset:
         np.add.at(
             counts, ([planes.index(p) for p in rows], [sections.index(int(s)) for s in columns]), 1
         )
-        words = {"long_name": f"samples in which the V-joint {word} most", "units": "1"}
-        found[word] = (("plane", "section"), counts, words)
+        says = about(f"samples in which the V-joint {word} most")
+        found[word] = ("plane", "section"), counts, says
     found.attrs = {"samples": int(told.sum()), "of": campaign.sizes["sample"]}
     return found

@@ -13,7 +13,7 @@ from ringsim.analysis.influence import confounding_notes, partners
 from ringsim.analysis.intervals import LEVEL, quantities
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table, counted, interval_text, number_text
+from ringsim.tables import Table, chance_text, counted, interval_text, number_text
 
 # Every measure: the largest rank correlations, indices and areas of each output.
 
@@ -34,9 +34,7 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
     rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
     named = set[str]()
-    for output in quantities():
-        if f"{output}_rank_correlation" not in analysis:
-            continue
+    for output in _correlated(analysis):
         plain, partial = (
             (
                 analysis[f"{output}_{word}rank_correlation"].values,
@@ -193,7 +191,7 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
             outputs.setdefault((count, failed, chance), []).append(output)
     for (count, failed, chance), names in outputs.items():
         who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
-        p = f"p = {chance:.2g}" if chance else "p < 0.0001"
+        p = chance_text(chance)
         if chance < UNLIKELY:
             cures = ["require or analyse the outcome instead"] * (failed < count)
             if failed:  # what did not fail has no value because of what the antenna did
@@ -391,12 +389,7 @@ def _cleared(
 
 
 def _correlated(analysis: xr.Dataset) -> list[str]:
-    end = "_rank_correlation"
-    return [
-        str(name).removesuffix(end)
-        for name in analysis.data_vars
-        if str(name).endswith(end) and not str(name).endswith(f"_partial{end}")
-    ]
+    return [name for name in quantities() if f"{name}_rank_correlation" in analysis]
 
 
 def _ranked(analysis: xr.Dataset, output: str) -> Iterator[tuple[str, ...]]:

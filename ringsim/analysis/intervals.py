@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import binom, binomtest, bootstrap, norm, t
+from scipy.stats import binom, binomtest, bootstrap, nbinom, norm, t
 
 from ringsim.outputs import COORDINATES, OUTPUTS
 from ringsim.outputs.family import Array
@@ -207,37 +207,28 @@ def jackknife_error(left_out: Array) -> Array:
     return np.asarray(np.sqrt(squares * (len(left_out) - 1) / len(left_out)))
 
 
-def student(replicates: int, level: float = LEVEL) -> float:
+def student(replicates: int) -> float:
     """Half length of an interval over the standard error from so many replicates."""
-    return float(t.ppf(0.5 + level / 2, replicates - 1)) if replicates > 1 else np.nan
+    return float(t.ppf(0.5 + LEVEL / 2, replicates - 1)) if replicates > 1 else np.nan
 
 
 def quantile_of_replicates(
     values: Array, replicate: NDArray[np.int64], probability: float
-) -> tuple[Array, Array]:
-    """Interval of a quantile from independent replicates of a design.
+) -> Interval:
+    """Interval of a quantile of values, shape (n,), from independent replicates of a design.
 
     The shares of the replicates below the quantile scatter; what their interval leaves open is
     read off the distribution of all samples.  NaN if it reaches beyond that.
     Source: Woodruff, J. Am. Statistical Association 47 (1952).
     """
-    middle = quantile(values, probability)[..., None]
-    _, scatter, count = _jackknife((values <= middle).astype(float), replicate, np.mean)
-    half, size = student(count) * scatter, values.shape[-1]
-    ordered = np.sort(values, axis=-1)
-    ends = []
-    for level in (probability - half, probability + half):
-        place = level * size - 0.5  # the k-th of n values stands for the level (k - 1/2) / n
-        known = np.isfinite(place) & (place >= 0) & (place <= size - 1)
-        low = np.floor(np.where(known, place, 0)).astype(int)
-        first, second = (
-            np.take_along_axis(ordered, np.minimum(low + k, size - 1)[..., None], -1)[..., 0]
-            for k in (0, 1)
-        )
-        ends.append(np.where(known, first + (place - low) * (second - first), np.nan))
-    beyond = np.isnan(ends[0] + ends[1])
-    low, high = (np.where(beyond, np.nan, end) for end in ends)
-    return low, high
+    below = (values <= quantile(values, probability)).astype(float)
+    _, scatter, count = _jackknife(below, replicate, np.mean)
+    half, least = student(count) * float(scatter), 0.5 / len(values)
+    # The k-th of n values stands for the level (k - 1/2) / n: Hazen's definition.
+    if not least <= probability - half <= probability + half <= 1.0 - least:
+        return NONE
+    low, high = np.quantile(values, [probability - half, probability + half], method="hazen")
+    return float(low), float(high)
 
 
 def standard_error(values: Array, replicate: NDArray[np.int64] | None) -> tuple[Array, int]:
@@ -277,12 +268,9 @@ def of_difference(
 # Arithmetic of shares: intervals of one, exact, and of differences; samples that are needed.
 
 
-_MOST = 1 << 40
-
-
-def share_interval(count: int, samples: int, level: float = LEVEL) -> Interval:
+def share_interval(count: int, samples: int) -> Interval:
     """Two-sided exact interval of a share.  Source: Clopper and Pearson, Biometrika 26 (1934)."""
-    low, high = binomtest(count, samples).proportion_ci(level, method="exact")
+    low, high = binomtest(count, samples).proportion_ci(LEVEL, method="exact")
     return float(low), float(high)
 
 
@@ -302,20 +290,8 @@ def samples_needed(violations: int, probability: float, confidence: float) -> in
     >>> samples_needed(0, 0.99, 0.9), samples_needed(0, 0.99865, 0.9)
     (230, 1705)
     """
-    low, high = violations, violations + 1
-    while not _shows(violations, high, probability, confidence) and high < _MOST:
-        low, high = high, 2 * high
-    while high - low > 1:
-        middle = (low + high) // 2
-        if _shows(violations, middle, probability, confidence):
-            high = middle
-        else:
-            low = middle
-    return high
-
-
-def _shows(violations: int, samples: int, probability: float, confidence: float) -> bool:
-    return bool(binom.cdf(violations, samples, 1.0 - probability) <= 1.0 - confidence)
+    others = nbinom.isf(1.0 - confidence, violations + 1, 1.0 - probability)
+    return violations + 1 + int(others)
 
 
 def _score(count: int, samples: int) -> Interval:

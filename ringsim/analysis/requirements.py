@@ -1,5 +1,6 @@
 """Requirements of a campaign: which values an antenna must keep to, how probably, how surely."""
 
+import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.stepping.instant import Array
+from ringsim.tables import unit_text, with_unit
 from ringsim.units import Model
 from ringsim.variables import Fate
 
@@ -72,9 +74,8 @@ class Requirement(Model):
     def told(self, name: str) -> str:
         """The requirement in words, with units."""
         units = quantities()[name].units if name in quantities() else "1"
-        unit = "" if units == "1" else f" {units}"
         return f"{name} " + " and ".join(
-            f"{kind.sign} {bound}" if kind.of_words else f"{kind.sign} {bound:g}{unit}"
+            f"{kind.sign} {bound if kind.of_words else with_unit(f'{bound:g}', units)}"
             for kind, bound in self.given
         )
 
@@ -108,8 +109,9 @@ def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
                 f"{name}.is = {show(each.is_)}: only the outcome is a word: give max or min"
             )
         elif not each.given:
-            unit = "" if (u := quantities()[name].units) == "1" else f", in {u}"
-            raise ValueError(f"{name} needs a bound: give max or min{unit}")
+            unit = unit_text(quantities()[name].units)
+            told = f", in {unit}" if unit else ""
+            raise ValueError(f"{name} needs a bound: give max or min{told}")
         elif each.max is not None and each.min is not None and each.min >= each.max:
             raise ValueError(f"{name}.min = {each.min:g} must be below max = {each.max:g}")
     return requirements
@@ -135,6 +137,11 @@ def read_requirements(table: Mapping[str, Any], source: str) -> dict[str, Requir
         return _Holder.model_validate({"requirements": dict(table)}).requirements
     except ValidationError as error:
         raise InputError(explain(error, _Holder, source)) from None
+
+
+def required_by(attributes: Mapping[Any, Any]) -> dict[str, Requirement]:
+    """The requirements that a design or a merged campaign keeps; none without any."""
+    return read_requirements(json.loads(attributes.get("requirements", "{}")), "requirements")
 
 
 def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:

@@ -43,7 +43,7 @@ from ringsim.sampling.distributions import Discrete, Distribution, inside
 from ringsim.sampling.table import AnyDistribution
 from ringsim.stepping.instant import Array
 from ringsim.units import Model
-from ringsim.variables import flags_of
+from ringsim.variables import about, flags_of
 
 # Estimates from samples with weights, and their intervals.
 
@@ -76,9 +76,7 @@ def mean(values: Array, weights: Array) -> float:
     return float(weights @ values / weights.sum())
 
 
-def mean_interval(
-    values: Array, weights: Array, replicate: Replicate, level: float = LEVEL
-) -> Interval:
+def mean_interval(values: Array, weights: Array, replicate: Replicate) -> Interval:
     """Interval of the weighted mean, with Student's t.
 
     Of independent samples by the linearised variance of a ratio, with one degree of freedom less
@@ -89,13 +87,13 @@ def mean_interval(
     if replicate is not None:
         low, high = replicate_interval(
             lambda rows: np.array(mean(values[rows], weights[rows])), replicate,
-            np.asarray, np.asarray, level,
+            np.asarray, np.asarray,
         )  # fmt: skip
         return float(low), float(high)
     free = effective(weights) - 1
     if free < 1:
         return NONE
-    half = float(t.ppf(0.5 + level / 2, free)) * _error(values, weights, centre)
+    half = float(t.ppf(0.5 + LEVEL / 2, free)) * _error(values, weights, centre)
     return centre - half, centre + half
 
 
@@ -106,9 +104,7 @@ def _error(values: Array, weights: Array, centre: float) -> float:
     return float(np.sqrt(squares * (1 + 1 / free)) / weights.sum())
 
 
-def share_interval(
-    own: Mask, weights: Array, replicate: Replicate, level: float = LEVEL
-) -> Interval:
+def share_interval(own: Mask, weights: Array, replicate: Replicate) -> Interval:
     """Interval of the weighted share of some samples.
 
     The exact one for as many samples as would have that standard error; where none or all are of
@@ -117,7 +113,7 @@ def share_interval(
     share, few = mean(own.astype(float), weights), min(own.sum(), (~own).sum()) < _FEW
     share = 1.0 if own.all() else share  # not a bit less by round-off
     if replicate is not None and not few:
-        low, high = mean_interval(own.astype(float), weights, replicate, level)
+        low, high = mean_interval(own.astype(float), weights, replicate)
         return max(0.0, low), min(1.0, high)
     count = effective(weights)
     if count <= 2:
@@ -126,9 +122,9 @@ def share_interval(
         error = _error(own.astype(float), weights, share)
         count = share * (1 - share) / error**2
         # Fewer degrees of freedom than the count tells: t instead of the normal distribution.
-        wide = t.ppf(0.5 + level / 2, [len(own) - 1, max(effective(weights) - 1, 1)])
+        wide = t.ppf(0.5 + LEVEL / 2, [len(own) - 1, max(effective(weights) - 1, 1)])
         count *= float(wide[0] / wide[1]) ** 2
-    hits, tail = share * count, (1 - level) / 2
+    hits, tail = share * count, (1 - LEVEL) / 2
     low = beta.ppf(tail, hits, count - hits + 1) if share > 0 else 0.0
     high = beta.ppf(1 - tail, hits + 1, count - hits) if share < 1 else 1.0
     return float(low), float(high)
@@ -429,19 +425,17 @@ def reweight(
             _told(values[known], weights[known], level, placed, placed.replicate_of(index[known]))
             for level in REWEIGHTED_STATISTICS.values()
         ])  # fmt: skip
-        about = {"long_name": f"reweighted estimates of: {name}", "units": variable.units}
-        found[f"{name}_reweighted"] = "reweighted_statistic", rows[:, 0], about
+        says = about(f"reweighted estimates of: {name}", variable.units)
+        found[f"{name}_reweighted"] = "reweighted_statistic", rows[:, 0], says
         found[f"{name}_reweighted_interval"] = (
-            ("reweighted_statistic", "bound"),
-            rows[:, 1:3],
-            about,
-        )
+            ("reweighted_statistic", "bound"), rows[:, 1:3], says,
+        )  # fmt: skip
         found[f"{name}_decisive_samples"] = (
             "reweighted_statistic", rows[:, 3],
-            {"long_name": "effective samples that decide each estimate", "units": "1"},
+            about("effective samples that decide each estimate"),
         )  # fmt: skip
         found[f"{name}_effective_samples"] = (
-            (), effective(weights[known]), {"long_name": "effective samples", "units": "1"}
+            (), effective(weights[known]), about("effective samples"),
         )  # fmt: skip
     cap, shares, words = None, list[tuple[float, ...]](), list[str]()
     for word, (own, of) in _events(campaign, requirements, ok, gone).items():
@@ -456,18 +450,15 @@ def reweight(
         words.append(word)
         shares.append((share, *ends, decisive))
     told = np.array(shares).reshape(-1, 4)
-    about = {"long_name": "share if inputs had the other distributions", "units": "1"}
-    found["reweighted_share"] = "event", told[:, 0], about
-    found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:3], about
+    says = about("share if inputs had the other distributions")
+    found["reweighted_share"] = "event", told[:, 0], says
+    found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:3], says
     found["reweighted_share_decisive"] = (
-        "event", told[:, 3],
-        {"long_name": "effective samples of the event, or of the others if fewer", "units": "1"},
+        "event", told[:, 3], about("effective samples of the event, or of the others if fewer"),
     )  # fmt: skip
     if requirements and ok.any():
         found |= _verdicts(campaign, requirements, placed, weights, pairs)
-    found["effective_samples"] = (
-        (), count, {"long_name": "effective samples of all that ran", "units": "1"}
-    )  # fmt: skip
+    found["effective_samples"] = (), count, about("effective samples of all that ran")
     found["reweighted_samples"] = (), int(run.sum()), {"long_name": "samples that ran"}
     laws = {
         path: {"kind": kind_of(law), **law.model_dump(exclude_defaults=True)}
@@ -515,17 +506,15 @@ def _verdicts(
         verdict = verdict_of(*ends, wanted.probability)
         rows.append((verdict, mean((~broken[held]).astype(float), weights[held]), *ends))
     told = np.array(rows)
-    about = "probability to keep to it if inputs had the other distributions"
+    words = "probability to keep to it if inputs had the other distributions"
     return {
         "reweighted_verdict": (
             "requirement", told[:, 0].astype("i1"),
-            {"long_name": "verdict if inputs had the other distributions", "units": "1"}
-            | flags_of(Verdict),
+            about("verdict if inputs had the other distributions") | flags_of(Verdict),
         ),
-        "reweighted_probability": ("requirement", told[:, 1], {"long_name": about, "units": "1"}),
+        "reweighted_probability": ("requirement", told[:, 1], about(words)),
         "reweighted_bounds": (
-            ("requirement", "bound"), told[:, 2:],
-            {"long_name": f"one-sided bounds of the {about}", "units": "1"},
+            ("requirement", "bound"), told[:, 2:], about(f"one-sided bounds of the {words}"),
         ),
     }  # fmt: skip
 

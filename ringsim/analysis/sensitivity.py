@@ -18,6 +18,7 @@ from ringsim.analysis.influence import groups_of
 from ringsim.analysis.intervals import good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import Requirement
 from ringsim.stepping.instant import Array
+from ringsim.variables import about
 
 _LEAST_OF_A_KIND = 10
 """Samples that failed, and that did not, below which failure is no output to analyse."""
@@ -81,7 +82,8 @@ def sensitivity(
         for name, each in responses(campaign, requirements).items()
         if names is None or name in names or name not in quantities()
     }
-    if not outputs or not inputs.names or (blocks is None and not _plain(placed)):
+    plain = placed.population and placed.block == 1
+    if not outputs or not inputs.names or (blocks is None and not plain):
         return xr.Dataset()
     size = 1 if blocks is None else blocks.size
     # Blocks count, or samples, all of which have run.
@@ -120,20 +122,16 @@ def sensitivity(
     coords = {"input": inputs.names} if blocks is None else {"factor": blocks.groups}
     made = _dataset(outputs, found, coords, block is not None)
     of = "samples" if block is None else "blocks"
-    for k, (name, about) in enumerate({
+    for k, (name, words) in enumerate({
         "index_used": f"{of} that indices are from",
         "index_lost": f"{of} that are left out, because a sample of them has no value",
         "missing": f"samples of {count} that have run without a value",
         "missing_lost": "of these, samples whose run failed",
     }.items()):  # fmt: skip
-        made[name] = "output", counts[:, k], {"long_name": about, "units": "1"}
-    about = "probability that samples missing at random go with inputs as much"
-    made["missing_by_inputs"] = "output", chance, {"long_name": about, "units": "1"}
+        made[name] = "output", counts[:, k], about(words)
+    words = "probability that samples missing at random go with inputs as much"
+    made["missing_by_inputs"] = "output", chance, about(words)
     return made
-
-
-def _plain(placed: Placement) -> bool:
-    return placed.population and placed.block == 1
 
 
 def _sobol(values: Array, blocks: Blocks, replicate: NDArray[np.int64], *, binary: bool) -> Found:

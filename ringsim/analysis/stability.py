@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ringsim.analysis.engines import held
 from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
-from ringsim.tables import markdown_table
+from ringsim.tables import counted, markdown_table, unit_behind
 from ringsim.variables import GOALS, Cause, Fate, Status
 
 # Where the engines differ in a stability map: cells with another end, or with other values.
@@ -147,13 +147,13 @@ _MEANING = {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in
 
 def word_of(cause: Cause) -> str:
     """What a map calls a cause: "energy grew"; empty if it is none."""
-    return "" if cause in _NAMELESS else _WORDS.get(cause, cause.word.replace("_", " "))
+    return "" if cause in _NAMELESS else _WORDS.get(cause, cause.words)
 
 
 def _word(status: int, cause: int, fate: int) -> str:
     """Why a cell ended before its goal; empty if it did not."""
     if status == Status.OK:
-        return "" if fate in GOALS else Fate(fate).word.replace("_", " ")
+        return "" if fate in GOALS else Fate(fate).words
     return word_of(Cause(cause)) or Status(status).word
 
 
@@ -274,7 +274,7 @@ def summary(whole: xr.Dataset) -> str:
     ends = ", ".join(f"{count} {word}" for count, word in zip(counts, words, strict=True))
     anew = int(np.sum((whole["restarts"].values > 0) & (verdict == OK)))
     minutes = float(whole["cpu_time"].sum()) / 60.0
-    panels = f"{whole.sizes['group']} panel{'s' if whole.sizes['group'] > 1 else ''}"
+    panels = counted(whole.sizes["group"], "panel")
     return (
         f"{len(verdict)} cells in {panels}: {ends}; {anew} of the ok ones after "
         f"a new start with smaller steps; {minutes:.1f} minutes of processor time"
@@ -333,7 +333,7 @@ def borders(whole: xr.Dataset) -> list[list[str]]:
 def axis_label(group: xr.Dataset, axis: str) -> str:
     """What stands on an axis ("x" or "y") of one panel, with its unit."""
     label, units = (str(group[f"{axis}_{word}"].values) for word in ("label", "units"))
-    return label if units == "1" else f"{label} ({units})"
+    return unit_behind(label, units)
 
 
 def _causes(whole: xr.Dataset) -> str:

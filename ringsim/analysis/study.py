@@ -1,7 +1,6 @@
 """What the samples of a campaign say about its population: estimates, intervals, verdicts."""
 
-import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -37,7 +36,7 @@ from ringsim.analysis.intervals import (
     share_interval,
     worst_sample,
 )
-from ringsim.analysis.requirements import Requirement, read_requirements
+from ringsim.analysis.requirements import Requirement, read_requirements, required_by
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import tail
@@ -50,10 +49,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.stepping.instant import Array
 from ringsim.units import ListIn, Model
-from ringsim.variables import Status
-
-# What the samples of a campaign say about its population: estimates, intervals, verdicts.
-
+from ringsim.variables import Status, about
 
 QUANTILES = {"quantile_05": 0.05, "median": 0.5, "quantile_95": 0.95}
 STATISTICS = ("mean", "standard_deviation", *QUANTILES, "minimum", "maximum")
@@ -106,7 +102,7 @@ def analyse(
         )
     placed = placement(campaign)
     if requirements is None:
-        requirements = json.loads(campaign.attrs.get("requirements", "{}"))
+        requirements = required_by(campaign.attrs)
     plain = {k: v for k, v in requirements.items() if not isinstance(v, Requirement)}
     wanted = {
         **{k: v for k, v in requirements.items() if isinstance(v, Requirement)},
@@ -126,10 +122,7 @@ def analyse(
             "stopping": "".join(stopping_lines(campaign, placed)), NOTE: losses(campaign).note,
         },
     )  # fmt: skip
-    found["part"].attrs = {
-        "long_name": "share of the samples that have run, the first ones",
-        "units": "1",
-    }
+    found["part"].attrs = about("share of the samples that have run, the first ones")
     stand = population_of(campaign)
     found = found.assign(statistics(stand, placed)).assign(tail(campaign)).assign(balance(campaign))
     more = [outcomes(stand, placed), influence(stand, wanted, placed)]
@@ -152,16 +145,9 @@ def _bent(found: xr.Dataset) -> list[str]:
     Verdicts, their bounds and shares of outcomes count lost runs, and counts are what they are.
     """
     of_all = (
-        "verdict",
-        "outcome",
-        "tail",
-        "samples",
-        "missing",
-        "group",
-        "index_used",
-        "index_lost",
+        "verdict", "outcome", "tail", "samples", "missing", "group", "index_used", "index_lost",
         "balance",
-    )
+    )  # fmt: skip
     safe = ("_samples", "_lower", "_upper", "_required", "_bounds", "_verdict", "_text", "_units")
     return [
         str(name) for name, each in found.data_vars.items()
@@ -190,49 +176,36 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
     used, index = values[known], campaign["sample"].to_numpy()[known]
     counts = [known.sum(), lost(campaign).sum(), (ok & ~known).sum()]
     parts = [used[place <= round(part * run.sum())] for part in PARTS]
-    about = campaign[name].attrs.get("long_name", name)
-    units = {"units": quantities()[name].units}
-
-    def told(words: str) -> dict[str, str]:
-        return units | {"long_name": f"{words} of: {about}"}
-
     errors = _errors(campaign, name, known, placed)
     ends = [np.argmin(used), np.argmax(used)]
     bars = numbers(campaign, f"{name}_error")[known][ends]
-    return {
-        name: ("statistic", estimates(used, placed), told("estimates")),
-        f"{name}_interval": (
-            ("statistic", "bound"), interval_of(used, index, placed), told("intervals of 95 %"),
+    worst = worst_sample(campaign, quantities()[name])
+    rows: dict[str, tuple[Any, Any, str]] = {
+        "": ("statistic", estimates(used, placed), "estimates"),
+        "_interval": (
+            ("statistic", "bound"), interval_of(used, index, placed), "intervals of 95 %",
         ),
-        f"{name}_convergence": (
-            ("part", "statistic"), np.array([estimates(part, placed) for part in parts]),
-            told("estimates from the first samples"),
+        "_convergence": (
+            ("part", "statistic"), [estimates(part, placed) for part in parts],
+            "estimates from the first samples",
         ),
-        f"{name}_samples": (
-            "counted", np.array([*counts, len(values) - sum(counts)], dtype="i8"),
-            told("samples") | {"units": "1"},
-        ),
-        f"{name}_end_sample": (
-            "bound", index[ends], told("samples with the least and the largest value")
-            | {"units": "1"},
-        ),
-        f"{name}_end_error": ("bound", bars, told("numerical error that these state")),
-        f"{name}_error_of_mean": (
-            "source", errors[:, 0], told("error of the mean by its source"),
-        ),
-        f"{name}_error_samples": (
-            "source", errors[:, 1].astype("i8"), told("samples that tell it") | {"units": "1"},
-        ),
-        f"{name}_largest_error": ("source", errors[:, 2], told("largest error of a sample")),
-        f"{name}_largest_error_sample": (
-            "source", errors[:, 3].astype("i8"), told("sample with that error") | {"units": "1"},
-        ),
-        f"{name}_worst_sample": (
-            (), worst_sample(campaign, quantities()[name]),
-            told("sample with the worst value; -1 where neither end is the worse one")
-            | {"units": "1"},
+        "_samples": ("counted", [*counts, len(values) - sum(counts)], "samples"),
+        "_end_sample": ("bound", index[ends], "samples with the least and the largest value"),
+        "_end_error": ("bound", bars, "numerical error that these state"),
+        "_error_of_mean": ("source", errors[:, 0], "error of the mean by its source"),
+        "_error_samples": ("source", errors[:, 1].astype("i8"), "samples that tell it"),
+        "_largest_error": ("source", errors[:, 2], "largest error of a sample"),
+        "_largest_error_sample": ("source", errors[:, 3].astype("i8"), "sample with that error"),
+        "_worst_sample": (
+            (), worst, "sample with the worst value; -1 where neither end is the worse one",
         ),
     }  # fmt: skip
+    meaning, units = campaign[name].attrs.get("long_name", name), quantities()[name].units
+    found = {}
+    for suffix, (dims, each, words) in rows.items():
+        unit = units if np.asarray(each).dtype.kind == "f" else "1"  # samples have none
+        found[f"{name}{suffix}"] = dims, np.asarray(each), about(f"{words} of: {meaning}", unit)
+    return found
 
 
 def estimates(values: Array, placed: Placement) -> Array:
@@ -253,26 +226,10 @@ def estimates(values: Array, placed: Placement) -> Array:
 
 def interval_of(values: Array, samples: NDArray[np.int64], placed: Placement) -> Array:
     """Intervals of all statistics as the design allows them, shape (statistic, 2)."""
-    found: dict[str, Any] = dict.fromkeys(STATISTICS, NONE)
-    if placed.has_intervals and len(values) > 1:
-        moments: dict[str, Callable[..., Any]] = {
-            "mean": np.mean,
-            "standard_deviation": intervals.spread,
-        }
-        replicate = placed.replicate_of(samples)
-        for name, statistic in moments.items():
-            found[name] = (
-                intervals.of_independent(values, statistic)
-                if replicate is None
-                else intervals.of_replicates(values, replicate, statistic)
-            )
-        for name, level in QUANTILES.items():
-            found[name] = (
-                intervals.quantile_of_independent(values, level)
-                if replicate is None
-                else intervals.quantile_of_replicates(values, replicate, level)
-            )
-    return np.array([*found.values()], dtype=float)
+    of: dict[str, Any] = {"mean": np.mean, "standard_deviation": intervals.spread, **QUANTILES}
+    return np.array([
+        placed.interval(values, samples, of[name]) if name in of else NONE for name in STATISTICS
+    ])  # fmt: skip
 
 
 def _errors(
@@ -323,7 +280,7 @@ def balance(campaign: xr.Dataset) -> dict[str, Any]:
     found: dict[str, Any] = {
         f"balance_{word}": (
             "balance", each if word in words[:2] else each.astype("i8"),
-            {"long_name": f"{word} of the errors of balance", "units": "1"},
+            about(f"{word} of the errors of balance"),
         )
         for word, each in zip(words, columns, strict=True)
     }  # fmt: skip
@@ -354,30 +311,30 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
             for side, each in enumerate((own, most))
         ]
     counts = [(own.sum(), most.sum() - own.sum()) for own, most in rows.values()]
-    of_kind = {"long_name": "share of the kind", "units": "1"}
     population = placed.population
     return xr.Dataset(
         {
             "outcome_samples": (
-                "kind", np.array([n for n, _ in counts], dtype="i8"),
-                {"long_name": "samples of the kind", "units": "1"},
+                "kind", np.array([n for n, _ in counts], dtype="i8"), about("samples of the kind"),
             ),
             "outcome_of": (
                 "kind", np.full(len(rows), of.sum(), dtype="i8"),
-                {"long_name": "samples of which the share is, all that ran", "units": "1"},
+                about("samples of which the share is, all that ran"),
             ),
             "outcome_lost": (
                 "kind", np.array([n for _, n in counts], dtype="i8"),
-                {"long_name": "lost samples, which may be of the kind, too", "units": "1"},
+                about("lost samples, which may be of the kind, too"),
             ),
-            "outcome_share": ("kind", shares[:, -1] if population else ends[:, 0], of_kind),
+            "outcome_share": (
+                "kind", shares[:, -1] if population else ends[:, 0], about("share of the kind"),
+            ),
             "outcome_share_interval": (
                 ("kind", "bound"), ends,
-                {"long_name": "interval of 95 % of the share, lost samples or not", "units": "1"},
+                about("interval of 95 % of the share, lost samples or not"),
             ),
             "outcome_share_convergence": (
                 ("kind", "part"), shares if population else np.full_like(shares, np.nan),
-                {"long_name": "share among the first samples", "units": "1"},
+                about("share among the first samples"),
             ),
         },
         coords={"kind": np.array([*rows], dtype=object)},

@@ -16,7 +16,7 @@ from ringsim.analysis.influence_text import (
     what_separates,
 )
 from ringsim.analysis.intervals import LEAST_OF_BOOTSTRAP, numbers, quantities, ranks
-from ringsim.analysis.requirements import OUTCOME, read_requirements
+from ringsim.analysis.requirements import OUTCOME, required_by
 from ringsim.analysis.reweighting import (
     LEAST_OF_MEAN,
     LEAST_OF_SHARE,
@@ -27,17 +27,10 @@ from ringsim.analysis.reweighting import (
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
-from ringsim.analysis.worst import (
-    MARK,
-    NOTE,
-    losses,
-    marked,
-    worst_lines,
-    worst_tables,
-)
+from ringsim.analysis.worst import MARK, NOTE, losses, marked, worst_lines, worst_tables
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import label_of
-from ringsim.tables import Table, counted, interval_text, number_text, slim
+from ringsim.tables import Table, counted, interval_text, number_text, slim, unit_text
 
 # Estimates for other distributions of inputs, as lines for people.
 
@@ -67,7 +60,7 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
             few = decisive < (LEAST_OF_MEAN if statistic == "mean" else LEAST_OF_SHARE)
             thin |= few
             rows.append((
-                f"{name}{THIN * few}{bent}", "" if variable.units == "1" else variable.units,
+                f"{name}{THIN * few}{bent}", unit_text(variable.units),
                 statistic.replace("_", " "),
                 number_text(one[name].item()), number_text(one[f"{name}_reweighted"].item()),
                 interval_text(*one[f"{name}_reweighted_interval"].values.tolist()),
@@ -110,7 +103,7 @@ def _verdicts(analysis: xr.Dataset) -> Table:
         rows.append((
             one["requirement_text"].item(), f"{one['probability_required'].item():g}",
             f"{one['confidence_required'].item():g}",
-            Verdict(one["reweighted_verdict"].item()).word.replace("_", " "),
+            Verdict(one["reweighted_verdict"].item()).words,
             number_text(one["reweighted_probability"].item()),
             interval_text(*one["reweighted_bounds"].values.tolist()),
         ))  # fmt: skip
@@ -206,16 +199,13 @@ def head_lines(analysis: xr.Dataset) -> list[str]:
 
 def verdict_lines(campaign: xr.Dataset) -> list[str]:
     """The verdicts on the requirements of a merged campaign's own file; none without any."""
-    own = json.loads(campaign.attrs.get("requirements", "{}"))
     placed, lost = placement(campaign), losses(campaign)
     found = xr.Dataset(tail(campaign), attrs={"samples": campaign.sizes["sample"]})
     lines = [*filter(None, [lost.note])]
     lines += [line + lost.mark for line in stopping_lines(campaign, placed)]
     lines += tail_table(found).lines()
-    if not own:
-        return lines
     try:
-        found = judge(population_of(campaign), read_requirements(own, "requirements"), placed)
+        found = judge(population_of(campaign), required_by(campaign.attrs), placed)
     except InputError as error:
         return [*lines, f"the requirements cannot be judged: {error}"]
     return [*lines, *verdict_table(found.assign_attrs({NOTE: lost.note})).lines()]
@@ -230,10 +220,10 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         further = one["further_samples"]
         rows.append((
             one["requirement_text"], f"{one['probability_required']:g}",
-            f"{one['confidence_required']:g}", _words(verdict), number_text(one["probability"]),
+            f"{one['confidence_required']:g}", verdict.words, number_text(one["probability"]),
             interval_text(one["probability_lower"], one["probability_upper"]),
             str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
-            _words(alone) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
+            alone.words if one["samples_lost"] else "-", str(further) if further > 0 else "-",
         ))  # fmt: skip
         if further > 0:
             more = counted(further, "further sample")
@@ -242,7 +232,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             notes.append(f"{name}: {more} without a violation would show it{kept}")
         if verdict != alone:
             notes.append(
-                f"{name}: it would be {_words(alone)} if lost samples were as the others, which "
+                f"{name}: it would be {alone.words} if lost samples were as the others, which "
                 "nobody knows: run them again (ringsim campaign --retry-failed)"
             )
         if not one["samples_used"]:
@@ -264,10 +254,6 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         "if lost ones were as the others", "further",
     )  # fmt: skip
     return marked(Table(head, rows, notes), analysis, head.index("estimate"))
-
-
-def _words(verdict: Verdict) -> str:
-    return verdict.word.replace("_", " ")
 
 
 def outcome_table(analysis: xr.Dataset) -> Table:
@@ -299,8 +285,7 @@ def statistics_table(analysis: xr.Dataset) -> Table:
         mean, deviation, *quantiles, least, most = values
         used, run = counts[0], counts[:3].sum()  # what has not run is the last
         count = str(used) if used == run else f"{used} of {run}"
-        units = analysis[name].attrs["units"]
-        units = "" if units == "1" else units
+        units = unit_text(analysis[name].attrs["units"])
         if least == most:
             rows.append((name, units, number_text(least), "all alike", *"------", "-", count))
         elif np.isfinite(least):
@@ -344,7 +329,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
     rows = []
     for name in outputs_in(analysis):
         used, lost, absent, _ = (str(n) for n in analysis[f"{name}_samples"].values)
-        units, values = analysis[name].attrs["units"], analysis[name].values
+        units, values = unit_text(analysis[name].attrs["units"]), analysis[name].values
         least, most = values[-2:]
         fine = digits_of(least, most)
         for k, statistic in enumerate(STATISTICS):
@@ -360,7 +345,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
                 bar = analysis[f"{name}_end_error"].values[side]
                 who = str(analysis[f"{name}_end_sample"].values[side]), number_text(bar, 2)
             rows.append((
-                name, "" if units == "1" else units,
+                name, units,
                 "all" if least == most else statistic.replace("_", " "), number_text(value, digits),
                 interval_text(low, high, digits), *who,
                 *(number_text(v, digits) for v in first), used, lost, absent,

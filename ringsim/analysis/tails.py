@@ -1,6 +1,7 @@
 """How probable a rare event is, by a campaign of subset simulation."""
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,16 +20,16 @@ from ringsim.analysis.intervals import (
 from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.subset_levels import Repetition
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table
-from ringsim.variables import Status
+from ringsim.tables import Table, chance_text, with_unit
+from ringsim.variables import Status, about
 
 DISAGREE = 0.01
 """Probability below which replicates scatter by more than their chains explain."""
 
 
-def subset_simulation(campaign: xr.Dataset) -> SubsetSimulation | None:
-    """The design of a campaign if it is subset simulation, else None."""
-    table = json.loads(campaign.attrs.get("design", "{}"))
+def subset_simulation(attributes: Mapping[Any, Any]) -> SubsetSimulation | None:
+    """The design that a campaign keeps if it is subset simulation, else None."""
+    table = json.loads(attributes.get("design", "{}"))
     if table.get("kind") != "subset-simulation":
         return None
     return SubsetSimulation.model_validate(table)
@@ -43,7 +44,7 @@ def approach(campaign: xr.Dataset) -> list[tuple[Array, Array]]:
     """Of each replicate the values of the output that its levels reached, the event's last, with
     the probability to be beyond each; what has no probability yet is left out.
     """
-    if (design := subset_simulation(campaign)) is None:
+    if (design := subset_simulation(campaign.attrs)) is None:
         return []
     found = []
     for one in design.levels(_responses(campaign, design)).repetitions:
@@ -101,7 +102,7 @@ def replicated_interval(each: Array, chains: Array, most: float = 1.0) -> tuple[
 
 def tail(campaign: xr.Dataset) -> dict[str, Any]:
     """Variables ``tail_...`` of a campaign of subset simulation; none of other campaigns."""
-    if (design := subset_simulation(campaign)) is None:
+    if (design := subset_simulation(campaign.attrs)) is None:
         return {}
     known = _responses(campaign, design)
     found = design.levels(known)
@@ -112,40 +113,33 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     units = campaign[design.of].attrs.get("units", "1")
     event = _event(design, design.target, units)
 
-    def told(words: str) -> dict[str, str]:
-        return {"long_name": words, "units": "1"}
-
+    levels = np.array([len(one.thresholds) + 1 for one in found.repetitions])
+    first = sum(len(one.states[0]) for one in found.repetitions if one.states)
+    of_chains = float(np.sqrt(np.mean(chains**2) / len(each)))
     return {
         "tail_probability": (
-            (), float(each.mean()), told(f"probability of {event}") | {"event": event},
+            (), float(each.mean()), about(f"probability of {event}") | {"event": event},
         ),
-        "tail_probability_interval": ("bound", ends, told("interval of 95 % of that probability")),
+        "tail_probability_interval": ("bound", ends, about("interval of 95 % of that probability")),
         "tail_agreement": (
             (), agreement(each, chains),
-            told("probability that replicates with the errors of their chains scatter as much"),
+            about("probability that replicates with the errors of their chains scatter as much"),
         ),
         "tail_unled": (
             (), unled,
-            told("upper bound of 97.5 % of that probability by the first levels' samples alone"),
+            about("upper bound of 97.5 % of that probability by the first levels' samples alone"),
         ),
-        "tail_unled_samples": (
-            (), sum(len(one.states[0]) for one in found.repetitions if one.states),
-            told("samples of the first levels"),
-        ),
-        "tail_variation": ((), variation, told("coefficient of variation of that probability")),
+        "tail_unled_samples": ((), first, about("samples of the first levels")),
+        "tail_variation": ((), variation, about("coefficient of variation of that probability")),
         "tail_variation_of_chains": (
-            (), float(np.sqrt(np.mean(chains**2) / len(each))),
-            told("the same from the correlation of chains alone"),
+            (), of_chains, about("the same from the correlation of chains alone"),
         ),
         "tail_replicate_probability": (
-            "tail_replicate", each, told("probability by each replicate"),
+            "tail_replicate", each, about("probability by each replicate"),
         ),
-        "tail_levels": (
-            "tail_replicate", np.array([len(one.thresholds) + 1 for one in found.repetitions]),
-            told("levels of each replicate"),
-        ),
-        "tail_lost": ((), int(lost(campaign).sum()), told("runs that failed: taken as no event")),
-        "tail_ended": ((), int(found.ended), told("whether all levels have run")),
+        "tail_levels": ("tail_replicate", levels, about("levels of each replicate")),
+        "tail_lost": ((), int(lost(campaign).sum()), about("runs that failed: taken as no event")),
+        "tail_ended": ((), int(found.ended), about("whether all levels have run")),
         **_short(design, known, found.repetitions, units),
         **_checks(campaign, design, known, found.repetitions, units),
     }  # fmt: skip
@@ -164,8 +158,8 @@ def _unled(found: list[Repetition], response: float) -> float:
 
 def _event(design: SubsetSimulation, response: float, units: str) -> str:
     """That the output is beyond a response, in words."""
-    unit = "" if units == "1" else f" {units}"
-    return f"{design.of} {'>' if design.sign > 0 else '<'} {design.sign * response:.6g}{unit}"
+    sign = ">" if design.sign > 0 else "<"
+    return f"{design.of} {sign} {with_unit(f'{design.sign * response:.6g}', units)}"
 
 
 def _short(
@@ -186,27 +180,21 @@ def _short(
     nearest = design.sign * float(np.max(known, where=np.isfinite(known), initial=-np.inf))
     return {
         "tail_reached_probability": (
-            (), float(each.mean()),
-            {"long_name": f"probability of {event}", "units": "1", "event": event},
+            (), float(each.mean()), about(f"probability of {event}") | {"event": event},
         ),
         "tail_reached_probability_interval": (
-            "bound", ends_of_interval,
-            {"long_name": "interval of 95 % of that probability", "units": "1"},
+            "bound", ends_of_interval, about("interval of 95 % of that probability"),
         ),
         "tail_nearest": (
-            (), nearest,
-            {"long_name": f"{design.of} of the run nearest to the event", "units": units},
+            (), nearest, about(f"{design.of} of the run nearest to the event", units),
         ),
     }  # fmt: skip
 
 
 def _checks(
-    campaign: xr.Dataset,
-    design: SubsetSimulation,
-    known: Array,
-    found: list[Repetition],
+    campaign: xr.Dataset, design: SubsetSimulation, known: Array, found: list[Repetition],
     units: str,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """What the runs repeated with the full engine say, and the probability with the limit moved by
     what the engines differ at most: nearer, and farther.
     """
@@ -230,16 +218,14 @@ def _checks(
     }
     return {
         **{
-            name: ((), int(chosen.sum()), {"long_name": words, "units": "1"})
+            name: ((), int(chosen.sum()), about(words))
             for name, (chosen, words) in counts.items()
         },
         "tail_difference": (
-            (), apart,
-            {"long_name": f"largest difference of {design.of} by the engines", "units": units},
+            (), apart, about(f"largest difference of {design.of} by the engines", units),
         ),
         "tail_probability_moved": (
-            "bound", np.array(moved),
-            {"long_name": "probability with the limit moved by as much", "units": "1"},
+            "bound", np.array(moved), about("probability with the limit moved by as much"),
         ),
     }  # fmt: skip
 
@@ -258,12 +244,11 @@ def short_of(found: xr.Dataset) -> list[str]:
     words = [f"below {high:.2g}, since {short} of {len(each)} replicates did not reach it"]
     if short < len(each):
         words.append(f"their mean is {each.mean():.2g}")
-    unit = "" if nearest.attrs["units"] == "1" else f" {nearest.attrs['units']}"
     return [
         *words,
         f"the bound is that of {reached.attrs['event']}, which all reached: probability "
         f"{float(reached):.3g} (95 % {low:.2g} .. {high:.2g})",
-        f"the nearest run has {float(nearest):.6g}{unit}",
+        f"the nearest run has {with_unit(f'{float(nearest):.6g}', nearest.attrs['units'])}",
     ]
 
 
@@ -274,11 +259,11 @@ def unseen_lines(found: xr.Dataset) -> list[str]:
     chance, most = float(found["tail_agreement"]), float(found["tail_unled"])
     samples, lines = int(found["tail_unled_samples"]), []
     if chance < DISAGREE:
-        p = f"p = {chance:.2g}" if chance >= 1e-4 else "p < 0.0001"
         lines.append(
-            f"replicates disagree by more than the errors of their chains ({p}): the event has "
-            "parts that only some of them found, so that the interval is as wide as their mean and "
-            f"the first {samples} samples allow; give more replicates, and more samples"
+            f"replicates disagree by more than the errors of their chains ({chance_text(chance)}): "
+            "the event has parts that only some of them found, so that the interval is as wide as "
+            f"their mean and the first {samples} samples allow; give more replicates, and more "
+            "samples"
         )
     lines.append(
         "parts of the event that no chain has found are in none of these numbers: the first "

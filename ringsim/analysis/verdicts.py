@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from scipy.stats import t
 
-from ringsim.analysis import intervals
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import (
     Interval,
@@ -29,9 +28,9 @@ from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, 
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
 from ringsim.refusal import known_or_nearest
-from ringsim.tables import counted, number_text
+from ringsim.tables import counted, number_text, with_unit
 from ringsim.units import Model
-from ringsim.variables import GOALS, Code, Fate, flags_of
+from ringsim.variables import GOALS, Code, Fate, about, flags_of
 
 # When a campaign may stop: the conditions, the looks at them, and how looks share an error.
 #
@@ -131,8 +130,6 @@ class Rule(Model):
         """
         if not self.judges(name):
             return wanted.confidence, wanted.confidence
-        from ringsim.analysis.intervals import samples_needed  # scipy.stats takes half a second
-
         needed = samples_needed(0, wanted.probability, wanted.confidence)
         # A campaign that ends between two looks has the part of the one to come.
         upper = [*self.numbers(samples, replicates), samples]
@@ -143,8 +140,6 @@ class Rule(Model):
         self, name: str, wanted: Requirement, samples: int, violations: int, replicates: int = 1
     ) -> int:
         """How many samples without a violation after so many would show it at a look."""
-        from ringsim.analysis.intervals import samples_needed
-
         least = samples_needed(violations, wanted.probability, wanted.confidence)
         for count in self.looks.numbers(replicates):
             if count > samples and count >= least:
@@ -222,9 +217,8 @@ def judge(
         for key, value in _judged(campaign, name, wanted, placed, rule).items():
             columns[key].append(value)
     known = {
-        name: ("requirement", values, {"long_name": words, "units": "1"})
-        for name, (words, _) in _MEANING.items()
-        for values in [np.array(columns[name], dtype=_MEANING[name][1])]
+        name: ("requirement", np.array(columns[name], dtype=kind), about(words))
+        for name, (words, kind) in _MEANING.items()
     }
     told = [each.told(name) for name, each in requirements.items()]
     found = xr.Dataset(known, coords={"requirement": np.array([*requirements], dtype=object)})
@@ -332,14 +326,13 @@ def holds(
             wanted = {each.requirement: requirements[each.requirement]}
             (code,) = judge(campaign, wanted, placed)["verdict"].to_numpy().tolist()
             shown = code in (Verdict.MET, Verdict.NOT_MET)
-            word = Verdict(code).word.replace("_", " ")
-            told.append(f"{wanted[each.requirement].told(each.requirement)} is {word}")
+            what = wanted[each.requirement].told(each.requirement)
+            told.append(f"{what} is {Verdict(code).words}")
         else:
-            half, shown = _half_width(each, campaign, placed), False
-            units = quantities()[str(each.of)].units
-            unit = "" if units == "1" else f" {units}"
+            half = _half_width(each, campaign, placed)
             shown = half <= float(each.half_width or 0.0)
-            told.append(f"the {each.what} is known to {number_text(half, 3)}{unit}")
+            known = with_unit(number_text(half, 3), quantities()[str(each.of)].units)
+            told.append(f"the {each.what} is known to {known}")
         if not shown:
             return ""
     return ", ".join(told)
@@ -349,22 +342,9 @@ def _half_width(condition: Condition, campaign: xr.Dataset, placed: Placement) -
     """Half the length of the interval of a mean or a quantile; NaN if there is none."""
     values = numbers(campaign, str(condition.of))
     known = good(campaign) & np.isfinite(values)
-    if known.sum() < 2 or not placed.has_intervals:
-        return float("nan")
-    used, replicate = values[known], placed.replicate_of(campaign["sample"].to_numpy()[known])
-    if condition.quantile is None:
-        low, high = (
-            intervals.of_independent(used, np.mean)
-            if replicate is None
-            else intervals.of_replicates(used, replicate, np.mean)
-        )
-    else:
-        low, high = (
-            intervals.quantile_of_independent(used, condition.quantile)
-            if replicate is None
-            else intervals.quantile_of_replicates(used, replicate, condition.quantile)
-        )
-    return float(high - low) / 2
+    of = np.mean if condition.quantile is None else condition.quantile
+    low, high = placed.interval(values[known], campaign["sample"].to_numpy()[known], of)
+    return (high - low) / 2
 
 
 def stopping_lines(campaign: xr.Dataset, placed: Placement) -> list[str]:

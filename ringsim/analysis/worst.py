@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ringsim.analysis.design import (
     LOST,
@@ -25,7 +24,8 @@ from ringsim.analysis.intervals import Mask, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table, counted
+from ringsim.tables import Table, chance_text, counted, with_unit
+from ringsim.variables import about
 
 # What is unusual in the inputs of a sample, in words.
 
@@ -118,13 +118,12 @@ def _told(name: str, rows: Array, value: float, units: str) -> str:
     if units == "K":
         word = "cold" if value < middle else "hot"
         return f"{word}: {name} {value:.4g} K ({value - _ZERO:+.0f} C{end})"
-    unit = "" if units == "1" else f" {units}"
     if rows.min() > 0.0 or rows.max() < 0.0:
         ratio = value / middle
         far = f"{100.0 * (ratio - 1.0):+.0f} %" if ratio < 3.0 else f"{ratio:.2g} times"
     else:
-        far = f"{value - middle:+.2g}{unit}"
-    return f"{name} {value:.4g}{unit} ({far}{end})"
+        far = with_unit(f"{value - middle:+.2g}", units)
+    return f"{name} {with_unit(f'{value:.4g}', units)} ({far}{end})"
 
 
 # The worst samples: of each requirement that is violated, of each outcome that falls short of the
@@ -170,25 +169,18 @@ def worst(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> xr.D
     if not rows:
         return xr.Dataset()
     failures, failed, of, found = zip(*rows, strict=True)
-    about: dict[str, tuple[NDArray[Any], str]] = {
-        "failure": (np.array(failures, dtype=object), "what failed"),
-        "failed": (np.array(failed), "samples that failed so"),
-        "of": (np.array(of), "samples that have run"),
-        "sample": (campaign["sample"].to_numpy()[chosen], "one of the worst of them"),
-        "found": (np.array(found, dtype=object), "its value, or why it ended"),
+    columns: dict[str, tuple[Any, dict[str, Any]]] = {
+        "failure": (np.array(failures, dtype=object), {"long_name": "what failed"}),
+        "failed": (np.array(failed), about("samples that failed so")),
+        "of": (np.array(of), about("samples that have run")),
+        "sample": (campaign["sample"].to_numpy()[chosen], about("one of the worst of them")),
+        "found": (np.array(found, dtype=object), {"long_name": "its value, or why it ended"}),
         "inputs": (
-            np.array(unusual(campaign, chosen), dtype=object), "what is unusual in its inputs",
+            np.array(unusual(campaign, chosen), dtype=object),
+            {"long_name": "what is unusual in its inputs"},
         ),
     }  # fmt: skip
-    return xr.Dataset(
-        {
-            f"worst_{name}": (
-                "worst", values,
-                {"long_name": words} | ({} if values.dtype.kind == "O" else {"units": "1"}),
-            )
-            for name, (values, words) in about.items()
-        }
-    )  # fmt: skip
+    return xr.Dataset({f"worst_{name}": ("worst", *each) for name, each in columns.items()})
 
 
 def _failures(
@@ -224,7 +216,7 @@ def _found(campaign: xr.Dataset, name: str, place: int) -> str:
     value = float(numbers(campaign, name)[place]) if name else np.nan
     if np.isfinite(value):
         units = quantities()[name].units
-        return f"{value:.4g}" + ("" if units == "1" else f" {units}")
+        return with_unit(f"{value:.4g}", units)
     why = str(campaign["reason"].to_numpy()[place]).split("; ")[0] if "reason" in campaign else ""
     return f"no value: {why}" if name else why
 
@@ -289,12 +281,11 @@ class Losses:
         """Why statistics are bent, in words; empty if they are not, as far as one can tell."""
         if not self.chance < UNLIKELY:
             return ""
-        p = f"p = {self.chance:.2g}" if round(self.chance, 4) else "p < 0.0001"
         return (
-            f"{self.count} of {self.ran} runs are lost, and which ones goes with inputs ({p}): "
-            f"what is marked{MARK} tells of the other {self.ran - self.count} alone, another "
-            "population, and may be far off (run the lost ones again: ringsim campaign "
-            "--retry-failed, or narrow the inputs)"
+            f"{self.count} of {self.ran} runs are lost, and which ones goes with inputs "
+            f"({chance_text(self.chance)}): what is marked{MARK} tells of the other "
+            f"{self.ran - self.count} alone, another population, and may be far off (run the lost "
+            "ones again: ringsim campaign --retry-failed, or narrow the inputs)"
         )
 
     @property
@@ -307,7 +298,7 @@ def losses(campaign: xr.Dataset) -> Losses:
     """The lost runs of a merged campaign; subset simulation takes them as no event, and says so."""
     run, gone = ran(campaign), lost(campaign)
     count, chance = int(gone.sum()), np.nan
-    if count and subset_simulation(campaign) is None:
+    if count and subset_simulation(campaign.attrs) is None:
         blocks, block = blocks_of(campaign), None
         if blocks is not None:
             block = np.unique(np.arange(len(run))[run] // blocks.size, return_inverse=True)[1]

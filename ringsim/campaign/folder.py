@@ -35,8 +35,6 @@ from ringsim.storage.netcdf import (
 from ringsim.units import LEFT_OUT
 from ringsim.variables import Fidelity, Status
 
-# A campaign's folder: its design, its identity, whether it may be gone on with; its merging.
-
 
 @dataclass(frozen=True)
 class Folder:

@@ -3,7 +3,6 @@
 import contextlib
 import csv
 import io
-import json
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -17,6 +16,7 @@ import xarray as xr
 
 from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.engines import check_lines, too_far
+from ringsim.analysis.tails import subset_simulation
 from ringsim.campaign.folder import (
     FAILED,
     Folder,
@@ -43,8 +43,6 @@ from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.netcdf import DESIGN, reserved
 from ringsim.storage.result import Result, check_of, sample_of
 from ringsim.variables import GOALS, Fate, Status
-
-# Running a campaign: run what is missing in its folder, merge, say how it ended.
 
 
 @dataclass(frozen=True)
@@ -304,10 +302,8 @@ def _suspects(folder: Folder, known: Array, design: SubsetSimulation) -> tuple[i
 
 def growth_told(folder: Folder) -> str:
     """How many runs a campaign that grows has, in words; nothing of others."""
-    table = json.loads(folder.attributes.get("design", "{}"))
-    if table.get("kind") != "subset-simulation":
+    if (design := subset_simulation(folder.attributes)) is None:
         return ""
-    design = SubsetSimulation.model_validate(table)
     if not len(folder.survey().missing):
         design = design.knowing(_responses(folder, design))
     return design.runs_told(folder.table.samples)

@@ -1,6 +1,5 @@
 """Ending a campaign once its samples are enough, at the same sample whoever has run them."""
 
-import json
 import os
 import time
 from bisect import bisect_right
@@ -14,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import placement
-from ringsim.analysis.requirements import OUTCOME, read_requirements
-from ringsim.analysis.verdicts import Rule, rule_of
+from ringsim.analysis.requirements import OUTCOME, required_by
+from ringsim.analysis.verdicts import Rule, holds, rule_of
 from ringsim.campaign.folder import Folder
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError
@@ -26,8 +25,6 @@ from ringsim.storage.netcdf import DESIGN, GO_ON, OutputTable, locked, provenanc
 from ringsim.storage.result import sample_of
 from ringsim.variables import Fidelity
 
-# Ending a campaign once its samples are enough, at the same sample whoever has run them.
-#
 # Samples end in any order, and beyond the last look some have run already.  The rule asks only the
 # first samples of a look, all of them and no others, and only once they have all run: its answer is
 # a function of the campaign alone.
@@ -82,8 +79,7 @@ class _Judge:
         self._empty = xr.Dataset(attrs=campaign.attributes)
         self._placed = placement(self._empty)
         self.numbers = rule.numbers(campaign.table.samples, self._placed.replicates)
-        own = json.loads(campaign.attributes.get("requirements", "{}"))
-        self._requirements = read_requirements(own, "requirements")
+        self._requirements = required_by(campaign.attributes)
         named = [each.requirement or each.of for each in rule.conditions]
         self._names = sorted({str(name) for name in named} - {OUTCOME})
         self._known = {name: np.empty(0) for name in self._names}
@@ -93,8 +89,6 @@ class _Judge:
         """What shows that the samples of a look are enough, "" if they are not; None if some of
         them, or of their checks, have not run.
         """
-        from ringsim.analysis.verdicts import holds  # scipy.stats takes half a second
-
         first = self._campaign.first(count)
         found = first.survey()
         if len(found.missing) or len(first.unchecked()):

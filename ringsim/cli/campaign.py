@@ -11,12 +11,18 @@ from ringsim.campaign.run import Order, Share, require_no_launcher, start
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.campaign.status import status_lines
 from ringsim.campaign.stopping import as_decided
-from ringsim.cli.options import FOLDER, PATH, PLOT_FORMAT, SETTINGS, require_plot
+from ringsim.cli.options import (
+    FOLDER,
+    PATH,
+    PLOT_FORMAT,
+    SETTINGS,
+    Formats,
+    draw_figures,
+    require_with,
+)
 from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.storage.merge import NAME as MERGED
-
-# ``ringsim campaign``: run a campaign, or finish an interrupted one.
 
 
 @click.command()
@@ -46,7 +52,7 @@ from ringsim.storage.merge import NAME as MERGED
 def campaign_command(
     file: Path, workers: int | None, settings: dict[str, Any], samples: int | None,
     out: Path | None, part: str, *, retry_failed: bool, dry_run: bool, plot: bool,
-    formats: tuple[str, ...] | None, solver: str, judge: str,
+    formats: Formats, solver: str, judge: str,
 ) -> int:  # fmt: skip
     """Run the campaign of FILE; the same command again goes on with what is missing.
 
@@ -54,7 +60,7 @@ def campaign_command(
     samples have run (some may have failed, up to max_failed), 3 too many or all of them failed, or
     the frame engine differs from the full one by more than max_difference, 130 stopped by a signal.
     """
-    require_plot(formats, plot=plot)
+    require_with("--plot-format", formats, "--plot", plot)
 
     def order() -> Order:
         if not dry_run:
@@ -71,11 +77,8 @@ def campaign_command(
             return
         import xarray as xr
 
-        from ringsim.plots.figures import draw_figures
-
         found = xr.load_dataset(folder / MERGED, engine="netcdf4")
-        for picture in draw_figures(found, folder, "campaign", formats or ("png",)):
-            click.echo(f"wrote {picture}")
+        draw_figures(found, folder, "campaign", formats)
 
     if dry_run:
         for line in plan(order(), max(1, workers or launched_size())):
@@ -87,9 +90,6 @@ def campaign_command(
     if ended.first:
         click.echo(str(ended.refused), err=True)
     return EXIT_BAD_INPUT
-
-
-# ``ringsim status``: how far a campaign is.
 
 
 @click.command()

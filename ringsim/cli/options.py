@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -11,6 +11,11 @@ from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.scene import builtin_scenes
 
+if TYPE_CHECKING:
+    import xarray as xr
+
+Formats = tuple[str, ...] | None
+"""Those of figures that were asked for, if any were."""
 PATH = click.Path(path_type=Path)
 WORKERS = click.IntRange(1, 4096)
 
@@ -19,7 +24,7 @@ def _assigned(_context: Any, _option: Any, texts: tuple[str, ...]) -> dict[str, 
     return dict(parse_assignment(text) for text in texts)
 
 
-def _formats(_context: Any, _option: Any, text: str | None) -> tuple[str, ...] | None:
+def _formats(_context: Any, _option: Any, text: str | None) -> Formats:
     if text is None:
         return None
     return listed("--plot-format", text, PLOT_FORMATS, "is no format of a figure")
@@ -63,15 +68,25 @@ SETTINGS = click.option(
 """Gives values by scene path."""
 
 
-def require_plot(formats: tuple[str, ...] | None, *, plot: bool) -> None:
-    """Refuse (InputError) formats of figures that nobody draws."""
-    if formats is not None and not plot:
-        raise InputError(
-            f"--plot-format {','.join(formats)}: says nothing without --plot; give both"
-        )
+def require_with(option: str, value: object, other: str, given: object) -> None:
+    """Refuse (InputError) an option that says nothing without another one."""
+    if value is not None and not given:
+        told = ",".join(value) if isinstance(value, tuple) else value
+        raise InputError(f"{option} {told}: says nothing without {other}; give both")
 
 
-def require_animate(colour: str | None, *, animate: bool) -> None:
-    """Refuse (InputError) a colour of an animation that nobody draws."""
-    if colour is not None and not animate:
-        raise InputError(f"--colour {colour}: says nothing without --animate; give both")
+def draw_figures(dataset: "xr.Dataset", folder: Path, name: str, formats: Formats) -> list[Path]:
+    """Draw all figures of a run or a campaign, and tell their files."""
+    from ringsim.plots import figures
+
+    drawn = figures.draw_figures(dataset, folder, name, formats or ("png",))
+    for picture in drawn:
+        click.echo(f"wrote {picture}")
+    return drawn
+
+
+def write_animation(run: "xr.Dataset", file: Path, colour: str | None) -> None:
+    """Write a run as a GIF, and tell its file."""
+    from ringsim.plots.animation import animate
+
+    click.echo(f"wrote {animate(run, file, colour or 'lag')}")

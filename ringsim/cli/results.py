@@ -1,6 +1,5 @@
 """``ringsim merge``, ``analyse``, ``report``, ``plot``, ``compare`` and ``export``."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +7,28 @@ import click
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import notes
+from ringsim.analysis.design import MERGED, median_and_worst, open_stored
 from ringsim.analysis.engines import check_lines
+from ringsim.analysis.requirements import parse_requirements, required_by
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.stopping import as_decided, merge
-from ringsim.cli.options import ANIMATE, COLOUR, FOLDER, PATH, PLOT_FORMAT, listed, require_animate
+from ringsim.campaign.stopping import as_decided, is_behind, merge
+from ringsim.cli.options import (
+    ANIMATE,
+    COLOUR,
+    FOLDER,
+    PATH,
+    PLOT_FORMAT,
+    Formats,
+    draw_figures,
+    listed,
+    require_with,
+    write_animation,
+)
+from ringsim.dataset import require_file, save
 from ringsim.files import require_place, writing
 from ringsim.refusal import InputError, known_or_nearest
-
-# Opening what verbs are called for: a folder that is not merged yet is merged first.
+from ringsim.storage.netcdf import runs_in
+from ringsim.tables import counted
 
 
 def opened(path: Path) -> xr.Dataset:
@@ -24,22 +37,11 @@ def opened(path: Path) -> xr.Dataset:
     Results of an interrupted campaign are merged first, which a line says.  While a campaign runs
     there nothing is: its end merges them.  InputError if there is none.
     """
-    from ringsim.analysis.design import MERGED, open_stored
-
-    if any(path.glob("journals/*")):
-        from ringsim.campaign.folder import open_folder
-        from ringsim.campaign.stopping import is_behind, merge
-        from ringsim.storage.netcdf import runs_in
-        from ringsim.tables import counted
-
-        if is_behind(path) and not runs_in(path):
-            left, _, _ = merge(open_folder(path), execution="merged on its own", partly=True)
-            told = f", {counted(left, 'sample')} not run" if left else ""
-            click.echo(f"{path}: merged its results into {MERGED} first{told}")
+    if any(path.glob("journals/*")) and is_behind(path) and not runs_in(path):
+        left, _, _ = merge(open_folder(path), execution="merged on its own", partly=True)
+        told = f", {counted(left, 'sample')} not run" if left else ""
+        click.echo(f"{path}: merged its results into {MERGED} first{told}")
     return open_stored(path)
-
-
-# ``ringsim merge``: put the results of a campaign into one file.
 
 
 @click.command()
@@ -59,9 +61,6 @@ def merge_command(folder: Path) -> None:
         with xr.open_dataset(path) as dataset:
             for line in [*notes(dataset), *check_lines(dataset), *verdict_lines(dataset)]:
                 click.echo(f"  {line}")
-
-
-# ``ringsim analyse DIR|FILE``.
 
 
 @click.command()
@@ -92,32 +91,29 @@ def analyse_command(
 
     Exit codes: 0 done, whatever the verdicts; 2 bad input.
     """
-    from ringsim.analysis.requirements import parse_requirements, read_requirements
     from ringsim.analysis.reweighting import parse_reweighted
     from ringsim.analysis.study import analyse
     from ringsim.analysis.study_text import told
-    from ringsim.dataset import require_file, save
 
     others = parse_reweighted(reweighted)
     wanted = parse_requirements(required)
     if out is not None:
         require_file(out)
     with opened(source) as campaign:
-        own = json.loads(campaign.attrs.get("requirements", "{}"))
         try:
-            judged = {**read_requirements(own, "requirements"), **wanted}
-            found = analyse(campaign, judged, others)
+            found = analyse(campaign, required_by(campaign.attrs) | wanted, others)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
     folder = source if source.is_dir() else source.parent
     for line in told(found, str(folder), full=full):
         click.echo(line)
+    _save(found, out)
+
+
+def _save(found: xr.Dataset, out: Path | None) -> None:
     if out is not None:
         save(found, out)
         click.echo(f"wrote {out}")
-
-
-# ``ringsim report``: a campaign as one page.
 
 
 @click.command()
@@ -132,8 +128,6 @@ def report_command(folder: Path, out: Path, analysis: Path | None) -> None:
 
     The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
     """
-    from ringsim.analysis.design import MERGED
-
     require_place(out)
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"--out {out}: the page is HTML: write {out.stem}.html")
@@ -141,7 +135,7 @@ def report_command(folder: Path, out: Path, analysis: Path | None) -> None:
         _write(campaign, folder / MERGED if folder.is_dir() else folder, out, analysis)
 
 
-def _write(campaign: Any, file: Path, out: Path, analysis: Path | None) -> None:
+def _write(campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None) -> None:
     from ringsim.report.page import LARGEST, write_report
 
     if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
@@ -158,9 +152,7 @@ def _write(campaign: Any, file: Path, out: Path, analysis: Path | None) -> None:
         click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the size it is meant to have")
 
 
-def _load(file: Path) -> Any:
-    import xarray as xr
-
+def _load(file: Path) -> xr.Dataset:
     try:
         return xr.load_dataset(file, engine="netcdf4")
     except (OSError, ValueError) as error:
@@ -168,9 +160,6 @@ def _load(file: Path) -> Any:
         raise InputError(
             f"{file}: cannot be read as a netCDF file: {reason}; merge again, or give another one"
         ) from None
-
-
-# ``ringsim plot FILE``.
 
 
 @click.command()
@@ -184,18 +173,16 @@ def _load(file: Path) -> Any:
 )  # fmt: skip
 @click.option("--out", metavar="DIR", type=PATH, help="Folder for the figures (default: FILE's).")
 def plot_command(
-    file: Path, formats: tuple[str, ...] | None, *, animate: bool, colour: str | None,
+    file: Path, formats: Formats, *, animate: bool, colour: str | None,
     sample: int | None, out: Path | None,
 ) -> None:  # fmt: skip
     """Draw the figures of a run, or of a campaign, from its FILE.
 
     FILE is what ringsim run, ringsim replay --save, ringsim campaign or ringsim merge has written.
     """
-    require_animate(colour, animate=animate)
-    if sample is not None and not animate:
-        raise InputError(f"--sample {sample}: says nothing without --animate; give both")
-    from ringsim.analysis.design import MERGED
-    from ringsim.plots.figures import draw_figures, left_out
+    require_with("--colour", colour, "--animate", animate)
+    require_with("--sample", sample, "--animate", animate)
+    from ringsim.plots.figures import left_out
 
     with opened(file) as dataset:
         file = file / MERGED if file.is_dir() else file
@@ -207,25 +194,18 @@ def plot_command(
                 "ringsim campaign has written (campaign.nc)"
             )
         folder = out or file.parent
-        drawn = draw_figures(dataset, folder, file.stem, formats or ("png",))
-        for picture in drawn:
-            click.echo(f"wrote {picture}")
+        drawn = draw_figures(dataset, folder, file.stem, formats)
         if why := left_out(dataset):
             click.echo(why)
         if not drawn:
             click.echo(f"{file}: nothing to draw: no run got as far as its first record")
         elif animate:
-            from ringsim.plots.animation import animate as write_animation
-
             run, name = _shown(dataset, sample, file)
-            moving = write_animation(run.load(), folder / f"{name}.gif", colour or "lag")
-            click.echo(f"wrote {moving}")
+            write_animation(run.load(), folder / f"{name}.gif", colour)
 
 
-def _shown(dataset: Any, sample: int | None, file: Path) -> tuple[Any, str]:
+def _shown(dataset: xr.Dataset, sample: int | None, file: Path) -> tuple[xr.Dataset, str]:
     """The run to animate, and the name of its file."""
-    from ringsim.analysis.design import median_and_worst
-
     if "sample" not in dataset.dims:
         if sample is not None:
             raise InputError(f"--sample {sample}: {file} holds one run: leave it out")
@@ -233,14 +213,15 @@ def _shown(dataset: Any, sample: int | None, file: Path) -> tuple[Any, str]:
     if sample is None:
         chosen = median_and_worst(dataset)
         sample = int(dataset["sample"][0]) if chosen is None else chosen[1]
+    _require_sample(dataset, sample, file)
+    return dataset.sel(sample=sample), f"{file.stem}-sample{sample}"
+
+
+def _require_sample(dataset: xr.Dataset, sample: int, file: Path) -> None:
     if sample not in dataset["sample"]:
         raise InputError(
             f"--sample {sample}: {file} holds samples 0 to {dataset.sizes['sample'] - 1}"
         )
-    return dataset.sel(sample=sample), f"{file.stem}-sample{sample}"
-
-
-# ``ringsim compare A B``.
 
 
 @click.command()
@@ -253,7 +234,6 @@ def compare_command(first: Path, second: Path, out: Path | None) -> None:
     Samples with equal seeds or inputs are compared in pairs, which shows much smaller differences.
     """
     from ringsim.analysis.comparison import compare, compared
-    from ringsim.dataset import require_file, save
 
     if out is not None:
         require_file(out)
@@ -264,12 +244,7 @@ def compare_command(first: Path, second: Path, out: Path | None) -> None:
             raise InputError(f"{first}, {second}: {error}") from None
     for line in compared(found):
         click.echo(line)
-    if out is not None:
-        save(found, out)
-        click.echo(f"wrote {out}")
-
-
-# ``ringsim export``: results for other programs.
+    _save(found, out)
 
 
 FORMATS = ("csv", "mat", "pvd")
@@ -316,10 +291,7 @@ def export_command(
         if samples and not campaign:
             raise InputError(f"--sample {samples[0]}: {file} holds one run: leave it out")
         for sample in samples:
-            if sample not in dataset["sample"]:
-                raise InputError(
-                    f"--sample {sample}: {file} holds samples 0 to {dataset.sizes['sample'] - 1}"
-                )
+            _require_sample(dataset, sample, file)
         if campaign and "pvd" in formats and not samples:
             raise InputError(
                 "--format pvd: shows runs, and this is a campaign: choose some with --sample"
@@ -349,7 +321,7 @@ def export_command(
         click.echo(f"wrote {path}")
 
 
-def _only(dataset: Any, names: tuple[str, ...], formats: tuple[str, ...]) -> Any:
+def _only(dataset: xr.Dataset, names: tuple[str, ...], formats: tuple[str, ...]) -> xr.Dataset:
     """The dataset with some of its variables; InputError if it has not all of them."""
     if not {"csv", "mat"} & set(formats):
         raise InputError("--variables: says nothing to --format pvd: leave it out")

@@ -1,5 +1,6 @@
 """``ringsim run`` and ``replay``: one run, and how far it is on a terminal."""
 
+import faulthandler
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -8,40 +9,38 @@ from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
+from ringsim.campaign.folder import open_folder, other_build
 from ringsim.choice import kind_of
-from ringsim.cli.options import (  # fmt: skip
+from ringsim.cli.options import (
     ANIMATE,
     COLOUR,
+    FOLDER,
     PATH,
     PLOT_FORMAT,
     SCENE,
     SETTINGS,
-    require_animate,
-    require_plot,
+    Formats,
+    draw_figures,
+    require_with,
+    write_animation,
 )
+from ringsim.execution.work import load_solver, solve
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
+from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.outputs.balance import rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import Watch
 from ringsim.stepping.instant import Instant
-from ringsim.variables import GONE, Outcome
+from ringsim.storage.result import Result, check_of
+from ringsim.variables import GOALS, GONE, TIMINGS, Outcome
 
 if TYPE_CHECKING:
     from ringsim.outputs.recorder import StoredState
-import faulthandler
-
-from numpy.typing import NDArray
-
-from ringsim.campaign.folder import open_folder, other_build
-from ringsim.cli.options import FOLDER
-from ringsim.execution.work import load_solver, solve
-from ringsim.outputs import COORDINATES, VARIABLES
-from ringsim.outputs.balance import rules
-from ringsim.storage.result import Result, check_of
-from ringsim.variables import GOALS, TIMINGS
 
 # How far a run is, on a terminal.
 
@@ -67,9 +66,6 @@ def watched(run: Callable[[Scene, Watch | None], Outcome], scene: Scene) -> Outc
             bar.update(now.time - bar.n)
 
         return run(scene, None if bar.disable else show)
-
-
-# ``ringsim run SCENE``.
 
 
 class _Fidelity(click.Choice[str]):
@@ -117,7 +113,7 @@ class _Fidelity(click.Choice[str]):
 def run_command(
     scene: str, settings: dict[str, Any], out: Path | None, fidelity: str | None,
     accuracy: float | None, of: str | None, evidence: Path | None, origin: Path | None,
-    at: float | None, *, plot: bool, formats: tuple[str, ...] | None, animate: bool,
+    at: float | None, *, plot: bool, formats: Formats, animate: bool,
     colour: str | None,
 ) -> int:  # fmt: skip
     """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
@@ -126,18 +122,16 @@ def run_command(
         chosen, fidelity = _with_accuracy(chosen, accuracy, of, evidence, settings, fidelity)
     start = _start(origin, at)
     fidelity = fidelity or ("full" if start is None else start.engine)
-    for name, value in (("--of", of), ("--evidence", evidence)):
-        if value is not None and accuracy is None:
-            raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
-    require_plot(formats, plot=plot)
-    require_animate(colour, animate=animate)
+    require_with("--of", of, "--accuracy", accuracy)
+    require_with("--evidence", evidence, "--accuracy", accuracy)
+    require_with("--plot-format", formats, "--plot", plot)
+    require_with("--colour", colour, "--animate", animate)
     chosen = chosen.with_values(settings)
     if colour == "stress" and not chosen.record.stress:
         raise InputError("--colour stress: needs the stresses: give --set record.stress=true, too")
     target = out or Path(f"{chosen.name}.nc")
 
     from ringsim.dataset import require_file, save, to_dataset
-    from ringsim.outputs import VARIABLES
     from ringsim.outputs.balance import summary
     from ringsim.simulation import run, run_frame
     from ringsim.stored_state import require_fit
@@ -179,19 +173,13 @@ def run_command(
         click.echo(f"  {line}")
     click.echo(f"{done} {target}")
     if plot:
-        from ringsim.plots.figures import draw_figures
-
-        for picture in draw_figures(dataset, target.parent, target.stem, formats or ("png",)):
-            click.echo(f"wrote {picture}")
+        draw_figures(dataset, target.parent, target.stem, formats)
         drawn = chosen.structure.locks and kind_of(chosen.rods) != "ancf"
         # Not recorded for the figure: steps that resolve the rods' vibration are another run.
         if drawn and not chosen.record.stress:
             click.echo("stresses are drawn with --set record.stress=true")
     if animate:
-        from ringsim.plots.animation import animate as write_animation
-
-        moving = write_animation(dataset, target.with_suffix(".gif"), colour or "lag")
-        click.echo(f"wrote {moving}")
+        write_animation(dataset, target.with_suffix(".gif"), colour)
         if not chosen.record.positions:
             click.echo("it shows computed positions with --set record.positions=true")
     failed = any(outcome.status.failed for outcome in outcomes.values())
@@ -252,9 +240,6 @@ def _with_accuracy(
     click.echo(f"settings for {accuracy:g}: fidelity = {picked.fidelity}, {words}")
     click.echo(f"  measured with {known.scene} to be good for: {errors}")
     return scene.with_values(values), picked.fidelity
-
-
-# ``ringsim replay``: run one sample of a campaign again, in the foreground.
 
 
 Arrays = dict[str, NDArray[Any]]

@@ -24,12 +24,9 @@ from ringsim.rigid.drive import turns_ever
 from ringsim.rigid.margin import MOST, DriveMargin, Margin, PlaneMargin
 from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
 from ringsim.scene.substituted import strained, substituted
-from ringsim.tables import text_table
+from ringsim.tables import counted, text_table
 from ringsim.units import Model
 from ringsim.variables import Variable
-
-# ``ringsim scenes``: what is built in, and its text as a starting point.
-
 
 SCHEMA = "scene.schema.json"
 """File beside a scene that editors check it by."""
@@ -38,11 +35,9 @@ SCHEMA = "scene.schema.json"
 @click.command()
 @click.argument("name", required=False)
 @click.option(
-    "--out",
-    metavar="FILE",
-    type=PATH,
+    "--out", metavar="FILE", type=PATH,
     help="Write it to this file, and a schema for editors beside it.",
-)
+)  # fmt: skip
 def scenes_command(name: str | None, out: Path | None) -> None:
     """List the built-in scenes, or print the TOML of one.
 
@@ -62,8 +57,7 @@ def scenes_command(name: str | None, out: Path | None) -> None:
     longest = max(map(len, texts))
     for key, text in texts.items():
         scene = scene_from_toml(text, source=f"scene {key}")
-        sections = scene.structure.sections
-        count = f"{sections} section{'s' if sections > 1 else ''}"
+        count = counted(scene.structure.sections, "section")
         click.echo(f"{key:<{longest}}  {count:>12}  {scene.title}")
 
 
@@ -82,9 +76,6 @@ def _write_with_schema(text: str, out: Path) -> None:
     ):
         write_text(path, content)
         click.echo(f"wrote {path}")
-
-
-# ``ringsim check``: validate a scene and say what it builds.
 
 
 _ASKED = ("margin", "hinge_spring", "temperature")
@@ -150,7 +141,7 @@ def _layout(scene: Scene) -> dict[str, str]:
     families = Counter(joint.family for joint in layout.joints)
     masses = layout.masses()
     parts = ", ".join(f"{name} {mass:.4g}" for name, mass in masses.items())
-    groups = {rod.group: _count(len(rod.stations) - 1, "element") for rod in layout.rods}
+    groups = {rod.group: counted(len(rod.stations) - 1, "element") for rod in layout.rods}
     elements = ", ".join(f"{count} in {group}" for group, count in groups.items())
     points = {
         "hinge assemblies": sum(map(len, layout.corners)),
@@ -159,7 +150,7 @@ def _layout(scene: Scene) -> dict[str, str]:
     return {
         "rods": f"{len(layout.rods)} {kind_of(scene.rods)} ({elements})",
         "points": ", ".join(f"{count} {name}" for name, count in points.items() if count),
-        "joints": ", ".join(_count(count, _JOINTS[kind]) for kind, count in counts.items()),
+        "joints": ", ".join(counted(count, _JOINTS[kind]) for kind, count in counts.items()),
         "mobility": _mobility(layout),
         "mass": f"{sum(masses.values()):.4g} kg: {parts}",
     }
@@ -189,14 +180,10 @@ _JOINTS = {
 }  # fmt: skip
 
 
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
 def _mobility(layout: Layout) -> str:
     if len(layout.openings[0]) > MOST_SECTIONS_FOR_MOBILITY:
         return f"not computed above {MOST_SECTIONS_FOR_MOBILITY} sections"
-    return f"{_count(internal_mobility(layout), 'internal degree')} of freedom with rigid rods"
+    return f"{counted(internal_mobility(layout), 'internal degree')} of freedom with rigid rods"
 
 
 def _fields(part: Model) -> str:
@@ -316,9 +303,6 @@ def _verdict(least: Margin) -> str:
     return f"least margin {least.margin:.3f} at {math.degrees(least.angle):.2f} deg: {word}"
 
 
-# ``ringsim explain``: what results, scenes and campaigns hold.
-
-
 def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
     """Variables, and paths of keys as far as the next dot."""
     from ringsim.reference import tree
@@ -362,13 +346,12 @@ def _key(name: str, variables: dict[str, Variable]) -> str:
     """A key of scenes or campaigns in words; InputError if there is none of that name."""
     # Here, because variables are explained without reading every record of the package.
     from ringsim.reference import tree
-    from ringsim.reference import tree as words
 
-    parts = [words.all_of(name)] if name in tree.ROOTS else []
+    parts = [tree.all_of(name)] if name in tree.ROOTS else []
     found = tree.find(name) if parts else tree.known(name, list(variables))
-    parts += [words.told(each) for each in found]
+    parts += [tree.told(each) for each in found]
     if any(place_of(each.path, closed=True) == "pulley" for each in found):
-        parts.append(words.names_of_pulleys(found[0].path))
+        parts.append(tree.names_of_pulleys(found[0].path))
     return "\n".join(parts)
 
 

@@ -14,8 +14,6 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import write_text
 from ringsim.scene import load_scene
 
-# ``ringsim accuracy SCENE``.
-
 
 @click.command()
 @SCENE
@@ -85,9 +83,6 @@ def accuracy_command(
     return EXIT_DONE
 
 
-# ``ringsim stability SCENE``: where the solver is sound, and how it ends where it is not.
-
-
 @click.command()
 @SCENE
 @SETTINGS
@@ -113,13 +108,10 @@ def accuracy_command(
     help="Share of the ok cells that are run again with smaller steps.",
 )  # fmt: skip
 @click.option(
-    "--fidelity",
-    type=click.Choice(["full", "frame", "both"]),
-    default="full",
-    show_default=True,
+    "--fidelity", type=click.Choice(["full", "frame", "both"]), default="full", show_default=True,
     help="Engine of the runs; both: side by side, with their error bars and a mark on cells in "
     "which they differ.",
-)
+)  # fmt: skip
 def stability_command(
     scene: str, settings: dict[str, Any], over: tuple[str, ...], points: int, out: Path | None,
     workers: int, percent: float, fidelity: str,

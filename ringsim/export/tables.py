@@ -10,6 +10,7 @@ from scipy.io import savemat
 
 from ringsim.files import whole
 from ringsim.refusal import InputError
+from ringsim.tables import unit_text
 
 # Codes and units of variables in words.
 
@@ -31,8 +32,7 @@ def in_words(variable: xr.DataArray) -> xr.DataArray:
 
 def units_of(variable: xr.DataArray) -> str:
     """Unit of a variable; empty of words and of numbers without one."""
-    units = str(variable.attrs.get("units", ""))
-    return "" if units == "1" else units
+    return unit_text(str(variable.attrs.get("units", "1")))
 
 
 def meaning_of(variable: xr.DataArray) -> str:

@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots import style as free_labels
 
 
 class Peak(NamedTuple):
@@ -39,12 +38,16 @@ class Peak(NamedTuple):
         return np.insert(times, at, self.time), np.insert(heights, at, factor * self.value)
 
 
-def peak_of(dataset: xr.Dataset, series: str, value: str, stem: str, until: float) -> Peak:
+def peak_of(
+    dataset: xr.Dataset, series: str, value: str, until: float = math.inf, stem: str = ""
+) -> Peak:
     """The largest of a variable over (..., time), at any step of a run up to a time in s.
 
-    ``value`` names the number that holds it; ``STEM_time`` and ``STEM_DIM`` are when and where.
-    What a dataset lacks of these is that of the largest record nearby.
+    ``value`` names the number that holds it; ``STEM_time`` and ``STEM_DIM`` are when and where,
+    the stem being its name if none is given.  What a dataset lacks of these is that of the largest
+    record nearby.
     """
+    stem = stem or value
     records = dataset[series].where(dataset["time"] <= until)
     time = float(dataset.get(f"{stem}_time", math.nan))
     after = int(np.searchsorted(records["time"].values, time))
@@ -73,7 +76,7 @@ def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) ->
     height = factor * peak.value
     axes.plot(peak.time, height, "o", color=style.VERMILLION, markersize=6, zorder=4, clip_on=False)
     early = peak.time < 0.5 * sum(axes.get_xlim())
-    free_labels.free(axes.text(
+    style.free(axes.text(
         0.98 if early else 0.02, 0.95 if early else 0.82,
         f"largest: {height:.3g} {units} at {peak.time:.4g} s\n{place}", transform=axes.transAxes,
         va="top", ha="right" if early else "left", color=style.VERMILLION, bbox=style.PAPER,

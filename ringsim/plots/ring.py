@@ -22,9 +22,6 @@ from ringsim.plots.registry import jointed, picture
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import Shape, Track, places_at, shape_of
 
-# The ring in space: stowed, between and deployed.
-
-
 Array = NDArray[np.float64]
 
 _ELEVATION = 24.0
@@ -261,7 +258,7 @@ def tension_over_length(dataset: xr.Dataset) -> Figure:
     parts = zip(_split(dataset, tension), _PASSAGES, strict=True)
     for (lengths, values), (name, colour, dashes) in parts:
         axes.plot(lengths, values, color=colour, linestyle=dashes, label=name)
-    top = peak_of(dataset, "cable_tension", "peak_tension", "peak_tension", np.inf)
+    top = peak_of(dataset, "cable_tension", "peak_tension")
     _mark(axes, dataset, top, str(tension.attrs["units"]))
     _length_axis(axes, dataset)
     axes.set_ylim(0.0, 1.12 * (peak := top.value))
@@ -303,8 +300,7 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
         left.plot([], [], color=colour, label=f"{1e3 * station[place]:.0f} mm along the beam")
     for name, _, dashes in _PASSAGES:
         left.plot([], [], color=style.GREY, linestyle=dashes, label=name)
-    peak = "peak_bending_strain"
-    _mark(left, dataset, peak_of(dataset, "bending_strain", peak, peak, np.inf), "")
+    _mark(left, dataset, peak_of(dataset, "bending_strain", "peak_bending_strain"), "")
     _length_axis(left, dataset)
     left.set_ylabel(style.label(strain))
     left.set_ylim(0.0, 1.35 * float(strain.max()))

@@ -4,10 +4,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -19,9 +20,6 @@ from ringsim.plots import style
 from ringsim.plots.peaks import mark, peak_of
 from ringsim.plots.registry import barred, jointed, picture
 from ringsim.scene import Scene, scene_from_toml
-
-# Stress in the rods over time.
-
 
 _COLOURS = (style.INK, "#d00000", style.BLUE, style.GREEN, style.ORANGE, style.PURPLE)
 _HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
@@ -49,7 +47,7 @@ def rod_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Fi
         )
     stress = dataset["rod_stress"]
     factor, units = style.readable_units(stress, dataset.get("peak_rod_stress", stress))
-    peak = peak_of(dataset, "rod_stress", "peak_rod_stress", "peak_stress", np.inf)
+    peak = peak_of(dataset, "rod_stress", "peak_rod_stress", stem="peak_stress")
     rods = list(dict.fromkeys(rod.rpartition("_")[0] for rod in stress["rod"].values.tolist()))
     figure = Figure(figsize=(11.0, 2.7 * -(-len(rods) // 2) + 1.1))
     grid = figure.subplots(-(-len(rods) // 2), 2, sharex=True, sharey=True)
@@ -222,9 +220,6 @@ def pulley_forces(dataset: xr.Dataset, plane: str) -> xr.DataArray:
     return xr.DataArray(found, coordinates, dims, "nodal_force", words)
 
 
-# Spans and tensions of a cable over time.
-
-
 def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
     """A cable's quantities by section over time from a recorded run of a ring.
 
@@ -259,6 +254,28 @@ def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
     return found
 
 
+def _by_plane(
+    dataset: xr.Dataset, planes: list[str], rows: int, size: tuple[float, float],
+    sharey: bool | Literal["row"] = "row",
+) -> tuple[Figure, NDArray[Any]]:  # fmt: skip
+    """A figure with a column of axes over time for each plane with a cable; ``size`` is the height
+    (inch) of a row, and of what stands above and below all rows.
+    """
+    figure = Figure(figsize=(5.4 * len(planes) + 0.4, size[0] * rows + size[1]))
+    grid = figure.subplots(rows, len(planes), sharex=True, sharey=sharey, squeeze=False)
+    for number, column in enumerate(grid.T):
+        style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
+    return figure, grid
+
+
+def _draw_sections(axes: Axes, time: xr.DataArray, rows: Array) -> None:
+    """A line a section, (section, time), counted from the winch."""
+    colours = style.section_colours(len(rows))
+    for section, row in enumerate(rows):
+        named = f"section {section + 1}"
+        axes.plot(time, row, color=colours(section), linewidth=1.2, label=named)
+
+
 @picture("run", 60, "Spans and tensions of the cables", ("cable_tension", "rope_strain"), barred)
 def cables(dataset: xr.Dataset) -> Figure:
     """Neutral lengths, elongations, decays and tensions, section by section.
@@ -270,21 +287,13 @@ def cables(dataset: xr.Dataset) -> Figure:
     planes = tension.dropna("plane", how="all")["plane"].values.tolist()
     series = {plane: section_series(dataset, plane) for plane in planes}
     names = list(series[planes[0]])
-    sections = dataset.sizes["section"]
-    colours = style.section_colours(sections)
     until = style.deployment_time(dataset)
     until = until if math.isfinite(until) else math.inf
-    peak = peak_of(dataset, "cable_tension", "peak_tension", "peak_tension", until)
-    figure = Figure(figsize=(5.4 * len(planes) + 0.4, 2.1 * len(names) + 0.8))
-    grid = figure.subplots(len(names), len(planes), sharex=True, sharey="row", squeeze=False)
-    for number, (column, plane) in enumerate(zip(grid.T, planes, strict=True)):
-        style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
+    peak = peak_of(dataset, "cable_tension", "peak_tension", until)
+    figure, grid = _by_plane(dataset, planes, len(names), (2.1, 0.8))
+    for column, plane in zip(grid.T, planes, strict=True):
         for axes, name in zip(column, names, strict=True):
-            for section, row in enumerate(series[plane][name].values):
-                axes.plot(
-                    dataset["time"], row, color=colours(section), linewidth=1.2,
-                    label=f"section {section + 1}",
-                )  # fmt: skip
+            _draw_sections(axes, dataset["time"], series[plane][name].values)
         style.name_panel(column[0], f"{plane} cable", height=0.2)
     for row, name in zip(grid, names, strict=True):
         drawn = np.concatenate([series[plane][name].values for plane in planes])
@@ -304,12 +313,9 @@ def cables(dataset: xr.Dataset) -> Figure:
             name = spans.sel(span=peak.place["span"]).coords.get("span_name")
             place = f"span {peak.place['span']}" + (f", {name.item()}" if name is not None else "")
             mark(axes, peak, str(tension.attrs["units"]), place + later)
-    style.name_sections(figure, grid[0, 0], sections)
+    style.name_sections(figure, grid[0, 0])
     style.head(figure, grid[0, 0], dataset, "Cables")
     return figure
-
-
-# How much of the tension every pulley passes on, over time.
 
 
 _SECTIONS = 4
@@ -327,10 +333,8 @@ def pulleys(dataset: xr.Dataset) -> Figure:
     ratio = dataset["pulley_ratio"].dropna("plane", how="all")
     planes, sections = ratio["plane"].values.tolist(), dataset.sizes["section"]
     shown = style.some_sections(sections, _SECTIONS)
-    figure = Figure(figsize=(5.4 * len(planes) + 0.4, 2.3 * len(shown) + 1.0))
-    grid = figure.subplots(len(shown), len(planes), sharex=True, sharey=True, squeeze=False)
-    for number, (column, plane) in enumerate(zip(grid.T, planes, strict=True)):
-        style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
+    figure, grid = _by_plane(dataset, planes, len(shown), (2.3, 1.0), sharey=True)
+    for column, plane in zip(grid.T, planes, strict=True):
         own = ratio.sel(plane=plane).transpose("pulley", "time").values
         for axes, section in zip(column, shown, strict=True):
             for node, (colour, dash), row in zip(NODES, _LINES, own[3 * section :], strict=False):
@@ -348,9 +352,6 @@ def pulleys(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-# Forces of the cables on the pulleys of every section over time.
-
-
 _DRAWN = ("along", "inwards")
 
 
@@ -364,18 +365,11 @@ def nodal_forces(dataset: xr.Dataset) -> Figure:
     planes = tension.dropna("plane", how="all")["plane"].values.tolist()
     forces = {plane: pulley_forces(dataset, plane) for plane in planes}
     rows = [(node, component) for node in NODES for component in _DRAWN]
-    sections = dataset.sizes["section"]
-    colours = style.section_colours(sections)
-    figure = Figure(figsize=(5.4 * len(planes) + 0.4, 1.9 * len(rows) + 0.8))
-    grid = figure.subplots(len(rows), len(planes), sharex=True, sharey="row", squeeze=False)
-    for number, (column, plane) in enumerate(zip(grid.T, planes, strict=True)):
-        style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
+    figure, grid = _by_plane(dataset, planes, len(rows), (1.9, 0.8))
+    for column, plane in zip(grid.T, planes, strict=True):
         for axes, (node, component) in zip(column, rows, strict=True):
-            for section, row in enumerate(forces[plane].sel(node=node, component=component).values):
-                axes.plot(
-                    dataset["time"], row, color=colours(section), linewidth=1.2,
-                    label=f"section {section + 1}",
-                )  # fmt: skip
+            own = forces[plane].sel(node=node, component=component)
+            _draw_sections(axes, dataset["time"], own.values)
             axes.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=1.4)
         style.name_panel(column[0], f"{plane} cable", height=0.2)
     for row, (node, component) in zip(grid, rows, strict=True):
@@ -384,12 +378,9 @@ def nodal_forces(dataset: xr.Dataset) -> Figure:
         )
         row[0].set_ylabel(f"{node[:1].upper()}{node[1:]},\n{component} (N)")
         style.signed_sizes(row[0], drawn)
-    style.name_sections(figure, grid[0, 0], sections)
+    style.name_sections(figure, grid[0, 0])
     style.head(figure, grid[0, 0], dataset, "Forces on the pulleys")
     return figure
-
-
-# Resistance by kind against the drive, and the margin, over the opening angle.
 
 
 _SOURCES = (

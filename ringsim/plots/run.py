@@ -16,9 +16,6 @@ from ringsim.plots import style
 from ringsim.plots.peaks import label_of, mark, peak_of
 from ringsim.plots.registry import jointed, picture
 
-# Opening angles of all V-joints over time.
-
-
 LEAST_SPAN = 0.01
 """Smallest range (degree) of the axis of deviations, so that round-off is not magnified."""
 
@@ -104,9 +101,6 @@ def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray) -> N
     grid[1, 0].set_ylim(-span, span)
 
 
-# Asynchrony of the sections over time.
-
-
 _CLOSE = (0.02, 0.5)
 """Least and largest share of the run that the enlarged end shows: fewer records are a few straight
 lines, and more is what the whole run shows as well."""
@@ -121,7 +115,7 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     values = dataset["asynchrony"].dropna("time")
     moving = values[~(values["time"].values > style.deployment_time(dataset))]
     end = float(moving["time"][-1])
-    peak = peak_of(dataset, "asynchrony", "asynchrony_max", "asynchrony_max", end)
+    peak = peak_of(dataset, "asynchrony", "asynchrony_max", end)
     times, heights = peak.within(moving)
     figure = Figure(figsize=(10.2, 4.3))
     whole, close = figure.subplots(1, 2, width_ratios=(3, 2))
@@ -164,9 +158,6 @@ def _last_seconds(dataset: xr.Dataset, end: float, peak: float) -> tuple[float, 
     least, most = (share * end for share in _CLOSE)
     length = min(max(1.5 * (end - first), least), most)
     return end - length, max(end, np.nan_to_num(style.deployment_time(dataset))) + 0.05 * length
-
-
-# Work, energies and energy balance of a run over time.
 
 
 _LOOKS = {
@@ -217,9 +208,6 @@ def imbalance(dataset: xr.Dataset) -> xr.DataArray:
     return (lack - first).assign_attrs(units=dataset["work"].attrs["units"])
 
 
-# Which section is ahead and which behind, over time.
-
-
 _TRIANGLE: dict[str, Any] = {
     "color": style.VERMILLION, "markersize": 9, "markeredgecolor": "white", "clip_on": False,
 }  # fmt: skip
@@ -234,28 +222,21 @@ def section_map(dataset: xr.Dataset) -> Figure:
     farthest apart when ``asynchrony`` is largest, which may be between two records.
     """
     found = deviations(dataset).transpose("plane", "section", "time")
-    times, sections = found["time"].values, found["section"].values
-    planes = found["plane"].values.tolist()
+    sections, planes = found["section"].values, found["plane"].values.tolist()
     span = max(style.largest_magnitude(found), LEAST_SPAN)
-    peak = peak_of(dataset, "asynchrony", "asynchrony_max", "asynchrony_max", times[-1])
+    peak = peak_of(dataset, "asynchrony", "asynchrony_max", found["time"].values[-1])
     leader, laggard = apart(dataset, peak.time)
     locked = "lock_time" in dataset and bool(np.isfinite(dataset["lock_time"]).any())
     figure = Figure(figsize=(8.8, 2.7 * len(planes) + 0.9))
     grid = figure.subplots(len(planes), 1, sharex=True, squeeze=False)[:, 0]
-    middles = 0.5 * (times[1:] + times[:-1])
-    edges = np.concatenate([times[:1], middles, times[-1:]])
     for axes, plane in zip(grid, planes, strict=True):
-        image = axes.pcolormesh(
-            edges, np.append(sections, sections[-1] + 1) - 0.5, found.sel(plane=plane).values,
-            cmap="PuOr_r", vmin=-span, vmax=span, rasterized=True,
-        )  # fmt: skip
+        image = style.lag_image(axes, found.sel(plane=plane), span)
         marks = [(leader, "^"), (laggard, "v")]
         for section, marker in ((one[1], marker) for one, marker in marks if one[0] == plane):
             axes.plot(peak.time, section, marker, **_TRIANGLE)
         locks = dataset["lock_time"].sel(plane=plane).dropna("section") if locked else found[:0]
         if locks.size:  # a line without points would stand in the corner of the sheet
             axes.plot(locks, locks["section"], "o", **_DOT)
-        axes.grid(visible=False)
         axes.yaxis.set_major_locator(MaxNLocator(10, integer=True, min_n_ticks=1))
         axes.set_ylim(sections[0] - 0.5, sections[-1] + 0.5)
         axes.set_ylabel(f"{plane} plane")

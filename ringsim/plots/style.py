@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
@@ -26,6 +26,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from matplotlib.transforms import Bbox
 from PIL import Image
 
+from ringsim.tables import counted, unit_behind
 from ringsim.variables import Fate, Status
 
 # Words inside axes, put where they cover no curve.
@@ -132,7 +133,7 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     words = str(variable.attrs.get("long_name", variable.name))
     units = str(variable.attrs.get("units", "1")) if units is None else units
     words = words[:1].upper() + words[1:]
-    return textwrap.fill(words if units == "1" else f"{words} ({units})", width)
+    return textwrap.fill(unit_behind(words, units), width)
 
 
 def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
@@ -162,7 +163,7 @@ def deployment_time(dataset: xr.Dataset) -> float:
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
     status, fate = Status(int(dataset["status"])), Fate(int(dataset.get("outcome", Fate.NONE)))
-    word = (status if status.failed else fate).word.replace("_", " ")
+    word = (status if status.failed else fate).words
     if fate == Fate.DEPLOYED and math.isfinite(deployed := deployment_time(dataset)):
         return f"Deployed after {deployed:.2f} s"
     final = float(dataset.get("final_time", math.nan))
@@ -200,7 +201,7 @@ def scene_title(dataset: xr.Dataset) -> str:
     if count is None:
         return text
     true, told = re.subn(r"\b\d+-section\b", f"{count}-section", text)
-    return true if told else f"{text}, {count} section{'s' * (count != 1)}".removeprefix(", ")
+    return true if told else f"{text}, {counted(count, 'section')}".removeprefix(", ")
 
 
 def section_colours(sections: int) -> Colormap:
@@ -217,11 +218,23 @@ def some_sections(sections: int, most: int) -> list[int]:
     return [int(k) for k in np.unique(np.linspace(0, sections - 1, most).round())]
 
 
-def name_sections(figure: Figure, axes: Axes, sections: int) -> None:
+def name_sections(figure: Figure, axes: Axes) -> None:
     """Below the figure a legend of axes that have a named line for each section; six at most."""
     named = axes.get_legend_handles_labels()[0]
-    lines = [named[section] for section in some_sections(sections, 6)]
+    lines = [named[section] for section in some_sections(len(named), 6)]
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
+
+
+def lag_image(axes: Axes, lags: xr.DataArray, span: float) -> QuadMesh:
+    """Deviations (section, time) as a colour, at most ``span``: ahead orange, behind purple."""
+    time, sections = lags["time"].values, lags["section"].values
+    edges = np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
+    axes.grid(visible=False)
+    return axes.pcolormesh(
+        edges, np.append(sections, sections[-1] + 1) - 0.5,
+        lags.transpose("section", "time").values,
+        cmap="PuOr_r", vmin=-span, vmax=span, rasterized=True,
+    )  # fmt: skip
 
 
 def time_axes(

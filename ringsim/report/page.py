@@ -90,9 +90,6 @@ def _comments(text: str) -> dict[str, str]:
     return found
 
 
-# One page about a campaign, out of its merged file.
-
-
 LARGEST = 2_000_000
 """Bytes of a page: it is to go by mail."""
 

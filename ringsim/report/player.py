@@ -99,15 +99,20 @@ def _course(campaign: xr.Dataset, sample: int, name: str) -> dict[str, Any]:
     """Times and opening angles in 0.01 degree, (frame, V-joint), of one sample."""
     angle = campaign["opening_angle"].sel(sample=sample).transpose("time", "plane", "section")
     angle = angle.dropna("time", how="any")
-    places = np.unique(np.linspace(0, angle.sizes["time"] - 1, MOST_FRAMES).round().astype(int))
-    angle = angle.isel(time=places)
-    rows = angle.to_numpy().reshape(len(places), -1)
+    angle = _thinned(angle, MOST_FRAMES)
+    rows = angle.to_numpy().reshape(angle.sizes["time"], -1)
     return {
         "name": name, "sample": sample, "times": np.round(angle["time"].to_numpy(), 4).tolist(),
         "angles": packed(np.clip(100.0 * rows, UNRECORDED, _LARGEST)),
         "lowest": float(rows.mean(axis=1).min()),
         "places": _places(campaign, sample),
     }  # fmt: skip
+
+
+def _thinned(series: xr.DataArray, most: int) -> xr.DataArray:
+    """So many times of a series at most, evenly spread, both ends among them."""
+    last = series.sizes["time"] - 1
+    return series.isel(time=np.unique(np.linspace(0, last, most).round().astype(int)))
 
 
 def _places(campaign: xr.Dataset, sample: int) -> dict[str, Any] | None:
@@ -119,8 +124,7 @@ def _places(campaign: xr.Dataset, sample: int) -> dict[str, Any] | None:
     if found.sizes["time"] < 2:
         return None
     most = min(MOST_FRAMES, max(_LEAST_FRAMES, _MOST_BYTES // (6 * found.sizes["point"])))
-    frames = np.unique(np.linspace(0, found.sizes["time"] - 1, most).round().astype(int))
-    found = found.isel(time=frames)
+    found = _thinned(found, most)
     values = found.to_numpy()
     # The player turns the ring about its middle at the end; on the way it is where it is.
     values = values - 0.5 * (values[-1].min(axis=0) + values[-1].max(axis=0))

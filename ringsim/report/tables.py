@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import (
@@ -20,6 +19,7 @@ from ringsim.analysis.design import (
     paths_of,
 )
 from ringsim.refusal import show
+from ringsim.tables import number_text
 from ringsim.variables import Cause
 
 MOST_FAILURES = 100
@@ -30,11 +30,6 @@ _MOST_NAMED = 20
 Rows = list[list[str]]
 
 
-def number(value: float) -> str:
-    """As many digits as one reads."""
-    return f"{value:.5g}" if np.isfinite(value) else "-"
-
-
 def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
     """Samples, ending, cause, reason, command that repeats the first; how many rows are left out.
 
@@ -42,7 +37,7 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
     for all that ended in the same way.
     """
     words, goals = endings(campaign), (*REACHED, UNKNOWN, NOT_RUN)
-    causes = {int(cause): cause.word.replace("_", " ") for cause in Cause if cause}
+    causes = {int(cause): cause.words for cause in Cause if cause}
     codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
     alike: dict[tuple[str, str, str], list[int]] = {}
     for place, sample in enumerate(campaign["sample"].values.tolist()):
@@ -73,7 +68,7 @@ def drawn(campaign: xr.Dataset) -> Rows:
             counts = Counter(values.ravel().astype(str).tolist()).most_common(6)
             extent = ", ".join(f"{word} ({n})" for word, n in counts)
         else:
-            extent = f"{number(float(values.min()))} to {number(float(values.max()))}"
+            extent = " to ".join(number_text(end, 5) for end in (values.min(), values.max()))
         places = variable.shape[1] if variable.ndim > 1 else 1
         unit = str(variable.attrs.get("units", "-"))
         paths = ", ".join(paths_of(variable))
@@ -82,7 +77,7 @@ def drawn(campaign: xr.Dataset) -> Rows:
 
 
 def _short(value: Any) -> str:
-    return number(value) if isinstance(value, float) else show(value)
+    return number_text(value, 5) if isinstance(value, float) else show(value)
 
 
 def provenance(campaign: xr.Dataset) -> Iterator[tuple[str, str]]:

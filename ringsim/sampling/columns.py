@@ -23,9 +23,6 @@ from ringsim.sampling.distributions import (
 )
 from ringsim.units import ListIn, Model
 
-# The inputs of all samples, and how they lie in netCDF files.
-
-
 BLOCK_ROW = "block_row"
 """The label of a sample that says what it is within its block, see ``designs.grouped``."""
 

@@ -155,9 +155,6 @@ def inside(probability: Array) -> Array:
     return np.clip(probability, 2.0**-54, 1.0 - 2.0**-53)
 
 
-# A finite set of values.
-
-
 class Discrete(Distribution):
     """Each of the values with its probability; all alike if none are given.
 
@@ -198,22 +195,19 @@ class Discrete(Distribution):
                 )
         return self
 
-    def _upper_ends(self) -> Array:
-        shares = self.probabilities or (1.0 / len(self.values),) * len(self.values)
-        upper: Array = np.cumsum(shares)
-        return upper
+    @property
+    def _shares(self) -> tuple[float, ...]:
+        return self.probabilities or (1.0 / len(self.values),) * len(self.values)
 
     def quantile(self, probability: Array) -> Values:
         """The value whose interval of cumulative probability holds the given one."""
-        chosen = np.searchsorted(self._upper_ends()[:-1], probability, side="right")
-        values: Values = array_of(self.values)[chosen]
-        return values
+        chosen = np.searchsorted(np.cumsum(self._shares)[:-1], probability, side="right")
+        return np.asarray(array_of(self.values)[chosen])
 
     def log_density(self, values: Values) -> Array:
         """Logarithm of the probability of each value; of words and tables also by their labels."""
-        shares = self.probabilities or (1.0 / len(self.values),) * len(self.values)
         known: dict[Any, float] = {}
-        for value, share in zip(self.values, shares, strict=True):
+        for value, share in zip(self.values, self._shares, strict=True):
             number = type(value) in (int, float)
             known |= {label_of(value): share, str(value): share}
             known |= {float(value): share} if number else {}
@@ -221,17 +215,12 @@ class Discrete(Distribution):
         keys = (float(v) if type(v) in (int, float) else v for v in plainly)
         found = [known.get(k if isinstance(k, (str, float)) else label_of(k), 0.0) for k in keys]
         with np.errstate(divide="ignore"):
-            logarithms: Array = np.log(np.array(found)).reshape(np.shape(values))
-        return logarithms
+            return np.asarray(np.log(np.array(found)).reshape(np.shape(values)))
 
     def levels(self, count: int) -> Array:
         """One probability for each value, whatever ``count`` is: the middle of its interval."""
-        upper = self._upper_ends()
-        middle: Array = 0.5 * (upper + np.concatenate([[0.0], upper[:-1]]))
-        return middle
-
-
-# Normal distribution.
+        upper = np.cumsum(self._shares)
+        return np.asarray(0.5 * (upper + np.concatenate([[0.0], upper[:-1]])))
 
 
 class Normal(Continuous):
@@ -249,21 +238,18 @@ class Normal(Continuous):
 
     def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution."""
-        values: Array = self.mean + self.standard_deviation * ndtri(probability)
-        return values
+        return np.asarray(self.mean + self.standard_deviation * ndtri(probability))
 
     def log_density(self, values: Values) -> Array:
         """Logarithm of the density above."""
         scaled = (np.asarray(values, dtype=float) - self.mean) / self.standard_deviation
-        found: Array = -0.5 * scaled**2 - math.log(self.standard_deviation * math.sqrt(2 * math.pi))
-        return found
+        return np.asarray(
+            -0.5 * scaled**2 - math.log(self.standard_deviation * math.sqrt(2 * math.pi))
+        )
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
         return float(ndtr((value - self.mean) / self.standard_deviation))
-
-
-# Lognormal distribution.
 
 
 class Lognormal(Continuous):
@@ -301,9 +287,6 @@ class Lognormal(Continuous):
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
         return self._logarithm.probability(math.log(value)) if value > 0.0 else 0.0
-
-
-# A continuous distribution cut off at one or both ends.
 
 
 LEAST_MASS = 1e-6
@@ -364,11 +347,7 @@ class Truncated(Distribution):
         """Inverse of the cumulative distribution, inside the bounds to the bit."""
         below, above = self._ends()
         values = self.of.quantile(below + (above - below) * probability)
-        clipped: Values = np.clip(values, self.low, self.high)
-        return clipped
-
-
-# Uniform distribution.
+        return np.asarray(np.clip(values, self.low, self.high))
 
 
 class Uniform(Continuous):

@@ -10,7 +10,7 @@ Brehier, Gazeau, Goudenege, Lelievre and Rousset, Annals of Applied Probability 
 thresholds must lie for the mean of the probability to be exact.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -131,13 +131,10 @@ def levels(
                 waiting[k] = running[k].send(Answer(numbers[k], responses[numbers[k]]))
             except StopIteration:
                 continue
-    joined = (_joined(each, np.int64) for each in (parents, level, replicate))
-    of_parents, of_level, of_replicate = joined
+    of_parents, of_level, of_replicate = (
+        np.concatenate(each).astype(np.int64) for each in (parents, level, replicate)
+    )
     return Levels(of_parents, np.concatenate(anew), of_level, of_replicate, batches, found, ended)
-
-
-def _joined(parts: Sequence[Numbers], kind: type[np.int64]) -> Numbers:
-    return np.concatenate(parts).astype(kind)
 
 
 def _simulation(

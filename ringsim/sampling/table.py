@@ -33,15 +33,9 @@ _NAMED_ALREADY = ("sample", "sample_seed", "reason", "log", "corner", "pulley")
 
 
 def draw(
-    base: Scene,
-    inputs: Mapping[str, Distribution],
-    correlations: Sequence[Correlation],
-    design: Design,
-    *,
-    seed: int,
-    folder: Path,
-    error_bars_every: int = 0,
-) -> Table:
+    base: Scene, inputs: Mapping[str, Distribution], correlations: Sequence[Correlation],
+    design: Design, *, seed: int, folder: Path, error_bars_every: int = 0,
+) -> Table:  # fmt: skip
     """Draw all samples of a campaign, which vary the scene ``base``.
 
     Files that the design names are looked up in ``folder``; one sample in ``error_bars_every``

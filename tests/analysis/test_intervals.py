@@ -95,7 +95,8 @@ def test_replicates_of_designs_are_covered(kind, truth):
         ends = intervals.of_replicates(values, which, each)
         assert 0.92 <= share_covered(ends, truth[each]) <= 0.98
     for level in (0.05, 0.5, 0.95):
-        ends = intervals.quantile_of_replicates(values, which, level)
+        rows = [intervals.quantile_of_replicates(row, which, level) for row in values]
+        ends = np.transpose(rows)
         assert 0.92 <= share_covered(ends, truth[level]) <= 0.98
     above = (values > 2.3).astype(float)
     ends = intervals.of_replicates(above, which, np.mean)

@@ -12,12 +12,9 @@ from ringsim.analysis.design import judged_by, median_and_worst, told
 from ringsim.analysis.intervals import good
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import head
+from ringsim.plots.campaign.frame import head, legend
 from ringsim.plots.registry import picture
 from ringsim.plots.run import LEAST_SPAN
-
-# How far each section is ahead or behind, over all samples.
-
 
 _NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")
 """Asynchrony first: without a value of it there is nothing to draw."""
@@ -41,9 +38,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     found = read.bands
     planes, sections = found["plane"].values.tolist(), found["section"].values.tolist()
     looks = dict(zip(planes, _LOOKS, strict=False))
-    chosen = median_and_worst(campaign)
-    worst = chosen[1] if chosen is not None and chosen[1] in read.samples else None
-    one = None if worst is None else course(campaign, worst, found)
+    worst, one = _worst(campaign, read)
     columns = min(_WIDEST, len(sections))
     rows = -(-len(sections) // columns)
     figure = Figure(figsize=(max(1.75 * columns, 7.0), max(1.75 * rows, 2.4) + 1.7))
@@ -93,15 +88,20 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     return figure
 
 
+def _worst(campaign: xr.Dataset, read: Courses) -> tuple[int, xr.DataArray | None]:
+    """The sample with the largest asynchrony and its course; none if that was not recorded."""
+    chosen = median_and_worst(campaign)
+    if chosen is None or chosen[1] not in read.samples:
+        return -1, None
+    return chosen[1], course(campaign, chosen[1], read.bands)
+
+
 def _limits(drawn: list[xr.DataArray], sections: slice) -> tuple[float, float]:
     """What the curves of these sections need, and some air."""
     ends = [np.nan_to_num(each.isel(section=sections).values) for each in drawn]
     low, high = min(float(each.min()) for each in ends), max(float(each.max()) for each in ends)
     air = max(0.06 * (high - low), LEAST_SPAN)
     return low - air, high + air
-
-
-# Section by time: the lag of the median over the samples, and of the worst sample.
 
 
 @picture(
@@ -115,25 +115,17 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     """
     read = courses(campaign) if read is None else read
     found = read.bands
-    chosen = median_and_worst(campaign)
+    worst, one = _worst(campaign, read)
     columns = [("median of all samples", read.median)]
-    if chosen is not None and chosen[1] in read.samples:
-        one = course(campaign, chosen[1], found)
-        columns.append((f"worst: sample {chosen[1]}", one))
-    planes, sections = found["plane"].values.tolist(), found["section"].values
+    if one is not None:
+        columns.append((f"worst: sample {worst}", one))
+    planes = found["plane"].values.tolist()
     figure = Figure(figsize=(4.9 * len(columns), 2.2 * len(planes) + 1.3))
     grid = figure.subplots(len(planes), len(columns), sharex=True, sharey=True, squeeze=False)
-    time = found["time"].values
-    edges = np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
     span = max(LEAST_SPAN, *(style.largest_magnitude(values) for _, values in columns))
     for (name, values), axes_of in zip(columns, grid.T, strict=True):
         for plane, axes in zip(planes, axes_of, strict=True):
-            image = axes.pcolormesh(
-                edges, np.append(sections, sections[-1] + 1) - 0.5,
-                values.sel(plane=plane).transpose("section", "time").values,
-                cmap="PuOr_r", vmin=-span, vmax=span, rasterized=True,
-            )  # fmt: skip
-            axes.grid(visible=False)
+            image = style.lag_image(axes, values.sel(plane=plane), span)
             axes.set_title(f"{plane} plane, {name}", fontsize=9.5)
         axes_of[-1].set_xlabel(style.label(found["time"], width=44))
     bar = figure.colorbar(image, ax=grid.ravel().tolist(), pad=0.015)
@@ -143,9 +135,6 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     figure.supylabel(style.label(campaign["section"]), fontsize=10.5)
     head(figure, campaign, "Lag map", f"{told(campaign, len(read.samples))}.")
     return figure
-
-
-# Which V-joints lock first and last, and which never.
 
 
 def locks_of(campaign: xr.Dataset) -> Array:
@@ -201,14 +190,9 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     grid[-1].set_xlabel(style.label(campaign["section"]))
     grid[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     figure.supylabel("Share of the samples", fontsize=10.5)
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    legend(figure, [grid[0]])
     locks = locks_of(campaign)
     done = int(np.isfinite(locks).all(axis=(1, 2)).sum())
-    head(
-        figure,
-        campaign,
-        "Lock order",
-        f"{told(campaign, len(locks))}; all V-joints lock in {done}, only these have a last one.",
-    )
+    note = f"all V-joints lock in {done}, only these have a last one."
+    head(figure, campaign, "Lock order", f"{told(campaign, len(locks))}; {note}")
     return figure

@@ -76,9 +76,6 @@ def over_time(
     legend(figure, panels, 4)
 
 
-# What the base carries over time, by ending.
-
-
 _WORDS = {"base_force": "force at the base", "base_torque": "torque at the base"}
 
 
@@ -101,9 +98,6 @@ def base_load(campaign: xr.Dataset) -> Figure:
     note = f"{counted(campaign, words)} At recorded times: peaks may be higher."
     head(figure, campaign, "What the base carries", note)
     return figure
-
-
-# The margin of the drive: the smallest of each sample by its ending, and its course.
 
 
 _GOLDEN = 0.618034
@@ -183,9 +177,6 @@ def _laid(grid: Array, angle: Array, margins: Array) -> Array:
     return np.asarray(np.interp(grid, angle, margins, left=np.nan, right=np.nan))
 
 
-# Torque and speed of the motors over time, by ending.
-
-
 @picture(
     "campaign", 110, "Torque and speed of the motors over time, by ending",
     ("motor_torque", "motor_speed"),
@@ -213,9 +204,6 @@ def motors(campaign: xr.Dataset) -> Figure:
     grid[-1, 0].set_xlabel(style.label(read["time"]))
     head(figure, campaign, "Motors", counted(campaign, words))
     return figure
-
-
-# The largest tension of each span along the cables, over all samples.
 
 
 def peaks(campaign: xr.Dataset) -> xr.DataArray:
@@ -259,12 +247,8 @@ def tension(campaign: xr.Dataset) -> Figure:
                      fontsize=10.5)  # fmt: skip
     legend(figure, [grid[0]], 4)
     counted = int(np.isfinite(found.to_numpy()).any(axis=(1, 2)).sum())
-    head(
-        figure,
-        campaign,
-        "Tension along the cables",
-        f"{told(campaign, counted)}. At recorded times until the last lock.",
-    )
+    note = f"{told(campaign, counted)}. At recorded times until the last lock."
+    head(figure, campaign, "Tension along the cables", note)
     return figure
 
 

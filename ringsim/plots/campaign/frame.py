@@ -11,13 +11,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import QUANTILES
-from ringsim.analysis.design import population_of, requirements_of
-from ringsim.analysis.requirements import read_requirements
+from ringsim.analysis.design import population_of
+from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import losses
 from ringsim.plots import style
-
-# Head, caption and colours that the figures of a campaign share.
-
 
 LOOKS = {
     "deployed": (style.BLUE, "o"),
@@ -69,7 +66,7 @@ def standing(campaign: xr.Dataset) -> tuple[xr.Dataset, str]:
 
 def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
     """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
-    wanted = read_requirements(requirements_of(campaign), "requirements")
+    wanted = required_by(campaign.attrs)
     return wanted[name].limits if name in wanted else []
 
 

@@ -18,39 +18,20 @@ from ringsim.analysis.design import (
     inputs,
     judged_by,
     placement,
-    requirements_of,
     scalars,
     told,
     values_of,
 )
-from ringsim.analysis.intervals import (
-    good,
-    numbers,
-    of_independent,
-    of_replicates,
-    quantile,
-    ran,
-    tells_of,
-)
-from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements, violations
+from ringsim.analysis.intervals import good, numbers, quantile, ran, tells_of
+from ringsim.analysis.requirements import OUTCOME, Requirement, required_by, violations
 from ringsim.analysis.tails import approach, subset_simulation, tail
 from ringsim.analysis.verdicts import judge
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import (
-    WIDE,
-    head,
-    in_lines,
-    legend,
-    limits,
-    looks_of,
-    standing,
-)
+from ringsim.plots.campaign.frame import WIDE, head, in_lines, legend, limits, looks_of, standing
 from ringsim.plots.campaign.tornado import is_one_by_one
 from ringsim.plots.registry import picture
-
-# Cumulative distribution of the main numbers, with the limits that the campaign sets them.
-
+from ringsim.tables import unit_behind
 
 _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
@@ -120,20 +101,13 @@ def distributions(campaign: xr.Dataset) -> Figure:
             axes.set_ylabel("Samples at or below")
     most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
     notes = f" Dots: quantiles of 5, 50 and 95 %.{blocks}"
-    ends = (
-        " Where a curve ends below 100 %, it did not happen in the other samples: they count in "
-        "shares and dots, and violate limits."
-    )
-    head(
-        figure,
-        campaign,
-        "Distributions",
-        f"{told(campaign, most)}.{notes}{ends if short else ''}",
-    )
+    if short:
+        notes += (
+            " Where a curve ends below 100 %, it did not happen in the other samples: they count "
+            "in shares and dots, and violate limits."
+        )
+    head(figure, campaign, "Distributions", f"{told(campaign, most)}.{notes}")
     return figure
-
-
-# Main numbers and probabilities of requirements, as samples come in.
 
 
 _POINTS = 400
@@ -164,16 +138,12 @@ def band(
     shape (counts, 2); only counts that have one, with two samples of each replicate at least.
     """
     counts, replicate = _counts(len(values), _INTERVALS), placed.replicate_of(samples)
-    if not placed.has_intervals:
-        return counts[:0], np.empty((0, 2))
-    if replicate is None:
-        ends = np.array([of_independent(values[:n], np.mean) for n in counts])
-    else:
+    if replicate is not None:
         size = placed.replicates
         told_twice = [np.bincount(replicate[:n], minlength=size).min() >= 2 for n in counts]
         counts = counts[told_twice]
-        ends = np.array([of_replicates(values[:n], replicate[:n], np.mean) for n in counts])
-    ends = ends.reshape(-1, 2)
+    found = [placed.interval(values[:n], samples[:n], np.mean) for n in counts]
+    ends = np.array(found).reshape(-1, 2)
     known = np.isfinite(ends).all(axis=1)
     return counts[known], ends[known]
 
@@ -194,9 +164,8 @@ def judged(
 
 def _required(campaign: xr.Dataset) -> Mapping[str, Requirement]:
     """The requirements that samples can be judged by."""
-    wanted = read_requirements(requirements_of(campaign), "requirements")
     return {
-        name: each for name, each in wanted.items()
+        name: each for name, each in required_by(campaign.attrs).items()
         if name in campaign and (name == OUTCOME or tells_of(campaign, name)[good(campaign)].all())
     }  # fmt: skip
 
@@ -256,9 +225,6 @@ def _named(axes: Axes, words: str, count: int) -> None:
     axes.set_title(f"{words}\nn = {count}", fontsize=9.5, color=style.INK)
     axes.set_xlabel("Samples")
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
-
-
-# What becomes of a sample, by each of its drawn inputs.
 
 
 _MANY = 500
@@ -339,16 +305,11 @@ def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
 
 def _label(variable: xr.DataArray) -> str:
     units = str(variable.attrs.get("units", "1"))
-    words = called(variable)
-    what = ", mean" if variable.ndim > 1 else ""
-    what += "" if units == "1" else f" ({units})"
-    words = in_lines(words)
+    words = in_lines(called(variable))
+    what = unit_behind(", mean" if variable.ndim > 1 else "", units)
     if len(words.rpartition("\n")[2]) + len(what) > WIDE:
         what = "\n" + what.lstrip(", ")
     return words + what
-
-
-# How a campaign of subset simulation came to its rare event.
 
 
 @picture(
@@ -358,7 +319,7 @@ def rare_event(campaign: xr.Dataset) -> Figure:
     """Probability to be at or beyond the values that levels reached, a line a replicate; the
     event's own with its interval.
     """
-    design, found = subset_simulation(campaign), tail(campaign)
+    design, found = subset_simulation(campaign.attrs), tail(campaign)
     assert design is not None
     figure = Figure(figsize=(8.0, 4.6))
     axes = figure.subplots()

@@ -20,7 +20,6 @@ from ringsim.analysis.design import (
     inputs,
     placement,
     population_of,
-    requirements_of,
     scalars,
     told,
     values_of,
@@ -28,14 +27,13 @@ from ringsim.analysis.design import (
 from ringsim.analysis.indices import UNLIKELY
 from ringsim.analysis.influence import LEAST, influence
 from ringsim.analysis.intervals import ran
+from ringsim.analysis.requirements import required_by
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head, in_lines, legend, looks_of
 from ringsim.plots.registry import picture
-
-# Which inputs matter for the main numbers: bars with intervals, the longest on top.
-
+from ringsim.tables import unit_behind
 
 MEASURES = {
     "total_index": "Total Sobol' index",
@@ -158,7 +156,7 @@ def explained(campaign: xr.Dataset) -> bool:
     """
     known = [values_of(campaign, name)[1] for name in scalars(campaign)]
     varied = any(len(values) >= LEAST and np.ptp(values) > 0 for values in known)
-    return varied and bool(drawn(campaign).names) and subset_simulation(campaign) is None
+    return varied and bool(drawn(campaign).names) and subset_simulation(campaign.attrs) is None
 
 
 @picture(
@@ -167,7 +165,7 @@ def explained(campaign: xr.Dataset) -> bool:
 def tornado(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a bar an input or group; whiskers are intervals of 95 %."""
     # Those that something is required of first: a page has no room for all.
-    wanted = requirements_of(campaign)
+    wanted = required_by(campaign.attrs)
     every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
     found = every[:_MOST_PANELS]
     found = found or [("", Bars("", [], *_NONE, np.nan, "no measure is known"))]
@@ -234,9 +232,6 @@ def _row(
     middle, half = ends[known].mean(axis=1), np.ptp(ends[known], axis=1) / 2
     axes.errorbar(middle, height[known], xerr=half, fmt="none", ecolor=style.INK,
                   elinewidth=1.1, capsize=2.5)  # fmt: skip
-
-
-# What every single change of a one-at-a-time design does to the main numbers.
 
 
 _MOST_NAMED = 72
@@ -331,17 +326,15 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
                          label=f"{word} ({(ends == word).sum()})")  # fmt: skip
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.yaxis.set_major_locator(MaxNLocator(4))
-        text = str(campaign[name].attrs.get("long_name", name))
-        units = str(campaign[name].attrs.get("units", "1"))
-        axes.set_title(text + ("" if units == "1" else f" ({units})"), fontsize=9.5)
+        says = campaign[name].attrs
+        title = unit_behind(str(says.get("long_name", name)), str(says.get("units", "1")))
+        axes.set_title(title, fontsize=9.5)
     places = named(len(samples))
     names_shown = [textwrap.shorten(words[k], _WIDEST, placeholder=" ...") for k in places]
     panels[-1].set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
     panels[-1].set_xlim(-0.7, len(samples) - 0.3)
     legend(figure, [panels[0]], 4)
     counted = max(len(values_of(campaign, name)[0]) for name in names)
-    head(
-        figure, campaign, "One at a time",
-        f"{told(campaign, counted)}. Line: the first sample, the base case.",
-    )  # fmt: skip
+    note = f"{told(campaign, counted)}. Line: the first sample, the base case."
+    head(figure, campaign, "One at a time", note)
     return figure

@@ -17,9 +17,6 @@ from ringsim.sampling.columns import Correlation, read_inputs
 from ringsim.sampling.designs.family import Design, Factors, Samples
 from ringsim.sampling.distributions import Array, Values, array_of, inside, is_label
 
-# Full grid over the inputs.
-
-
 Levels = Annotated[int, Field(ge=1, le=100_000)]
 MOST_POINTS = 10_000_000
 
@@ -54,9 +51,6 @@ class Grid(Design):
                 "use fewer levels"
             )
         return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(size, -1)
-
-
-# Independent random samples.
 
 
 class RandomDesign(Design):
@@ -128,9 +122,6 @@ class Replicated(Design):
         raise NotImplementedError
 
 
-# Latin hypercube samples.
-
-
 class LatinHypercube(Replicated):
     """Every input has exactly one sample in each of its n intervals of equal probability.
 
@@ -143,11 +134,7 @@ class LatinHypercube(Replicated):
         """Random places within randomly permuted intervals."""
         from scipy.stats import qmc
 
-        points: Array = qmc.LatinHypercube(d=axes, rng=stream).random(samples)
-        return points
-
-
-# Scrambled Sobol samples.
+        return np.asarray(qmc.LatinHypercube(d=axes, rng=stream).random(samples))
 
 
 class Sobol(Replicated):
@@ -179,11 +166,7 @@ def sobol_points(samples: int, axes: int, stream: np.random.Generator, *, kind: 
             "draw fewer inputs"
         )
     engine = qmc.Sobol(d=axes, scramble=True, rng=stream, bits=30)
-    points: Array = engine.random_base2((samples - 1).bit_length())[:samples]
-    return points
-
-
-# Samples listed in a file.
+    return np.asarray(engine.random_base2((samples - 1).bit_length())[:samples])
 
 
 class Listed(Design):
@@ -286,9 +269,6 @@ def _from_netcdf(path: Path) -> dict[str, Values]:
     except OSError as error:
         raise InputError(f"design.file = {path.name}: cannot be read: {error}") from None
     return {column.path or column.name: column.values for column in columns}
-
-
-# One input after the other away from a base case.
 
 
 Places = Annotated[int, Field(ge=1, le=100_000)]
