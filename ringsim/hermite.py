@@ -1,9 +1,12 @@
-"""Piecewise cubics through values at increasing times, whose slopes are known or chosen.
+"""Curves in time: piecewise cubics with slopes known or chosen, polynomials beyond the last step.
 
-They are what ``scipy.interpolate`` has as CubicHermiteSpline and PchipInterpolator, and agree with
-these to round-off (tests/outputs/test_hermite.py).  Every run needs these two, and that package
-takes nearly as long to load as a ring of 18 sections to run.
+The cubics are what ``scipy.interpolate`` has as CubicHermiteSpline and PchipInterpolator, and agree
+with these to round-off (tests/outputs/test_hermite.py).  Every run needs these two, and that
+package takes nearly as long to load as a ring of 18 sections to run.
 """
+
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,3 +72,31 @@ def first_zero(step: float, values: Array, slopes: Array) -> float:
     roots = np.roots([first + last, -2.0 * first - last, first + risen, values[0]])
     real = roots.real[(np.abs(roots.imag) < 1e-12) & (roots.real >= 0.0) & (roots.real <= 1.0)]
     return step * float(real.min(initial=1.0))
+
+
+# Where a step begins Newton's method: the last steps' motion, extrapolated.
+#
+# With q the way since the last state and t_0 = 0 > t_1 > ... the times of the states before, q is
+# the polynomial through them in Newton's form, of the divided differences
+#
+#     q[t_j, t_j+1] = mean rate of the step between,   q[t_j ... t_j+k] by Neville's recursion.
+
+
+def extrapolated(moves: Sequence[tuple[float, Array]], step: float) -> Array:
+    """Change over the next ``step`` (s) of what has moved in steps of so many seconds at such mean
+    rates, the latest last: exact for polynomials up to as many degrees as there are moves.
+    """
+    times, level = [0.0], []
+    for duration, rate in reversed(moves):
+        times.append(times[-1] - duration)
+        level.append(rate)
+    power = step
+    found = power * level[0]
+    for order in range(2, len(times)):
+        power *= step - times[order - 1]
+        level = [
+            (later - earlier) / (times[n] - times[n + order])
+            for n, (later, earlier) in enumerate(pairwise(level))
+        ]
+        found = found + power * level[0]
+    return found

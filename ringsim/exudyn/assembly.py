@@ -11,9 +11,9 @@ from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Pose
 from ringsim.parts.joints import JointFriction
-from ringsim.stepping.events import extrapolated
 from ringsim.stepping.instant import Passing, lost_between
 from ringsim.stepping.locks import Turning
 

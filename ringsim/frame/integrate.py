@@ -15,6 +15,7 @@ from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter, Readings
 from ringsim.frame.state import State
+from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Array
 from ringsim.outputs.meters import Reading
 from ringsim.outputs.recorder import Recorder, States, StoredState, cleared, struck_by
@@ -24,7 +25,6 @@ from ringsim.refusal import InputError
 from ringsim.rigid.statics import scales_of
 from ringsim.scene import Scene
 from ringsim.stepping.control import go_on
-from ringsim.stepping.events import extrapolated
 from ringsim.stepping.instant import Instant, Memory, Strained
 from ringsim.stepping.run import Run
 from ringsim.variables import Outcome

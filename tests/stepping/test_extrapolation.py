@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ringsim.stepping.events import extrapolated
+from ringsim.hermite import extrapolated
 
 pytestmark = pytest.mark.quick
 
