@@ -4,6 +4,7 @@ that reads bodies, which no other output does.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
@@ -62,31 +63,37 @@ def test_a_bistable_hinge_opens_or_stays(fidelity: str) -> None:
     assert last.values == pytest.approx(120.0, abs=25.0)  # it swings from 149 to 108 deg, and less
 
 
-class CornerHeight(Output):
-    """Height of the mean of all corners of a plane above that of all planes."""
+@pytest.fixture
+def corner_height() -> Iterator[None]:
+    """An output that nothing knows any more after the test."""
+    before, shipped = list(OUTPUTS), dict(VARIABLES)
 
-    variables = (
-        Variable("corner_height", ("plane", "time"), "m", "height of the corners of a plane"),
-    )
+    class CornerHeight(Output):
+        """Height of the mean of all corners of a plane above that of all planes."""
 
-    def read(self, now: Reading) -> Array:
-        heights = now.meters.corners(now.meters.bodies().places)[..., 2]
-        return np.asarray(heights.mean(axis=1) - heights.mean())
+        variables = (
+            Variable("corner_height", ("plane", "time"), "m", "height of the corners of a plane"),
+        )
+
+        def read(self, now: Reading) -> Array:
+            heights = now.meters.corners(now.meters.bodies().places)[..., 2]
+            return np.asarray(heights.mean(axis=1) - heights.mean())
+
+    yield
+    OUTPUTS[:] = before
+    VARIABLES.clear()
+    VARIABLES.update(shipped)
 
 
+@pytest.mark.usefixtures("corner_height")
 def test_an_output_may_read_bodies_in_both_engines() -> None:
-    try:
-        scene = ring(151.0).with_values({"solver.end_time": 0.5})
-        one, other = (simulate(scene, fidelity=fidelity) for fidelity in ("frame", "full"))
-        layout = layout_of(scene)
-        drawn = np.array([[layout.bodies[n].pose.place[2] for n in row] for row in layout.corners])
-        expected = drawn.mean(axis=1) - drawn.mean()
-        for run in (one, other):
-            assert isinstance(run, xr.Dataset)
-            assert run.corner_height.isel(time=0).values == pytest.approx(expected, abs=1e-12)
-        gap = np.abs(one.corner_height - other.corner_height).max()
-        assert float(np.ptp(one.corner_height.dropna("time").values)) > 1e-3
-        assert float(gap) < 1e-5
-    finally:
-        OUTPUTS.remove(CornerHeight)
-        VARIABLES.pop("corner_height")
+    scene = ring(151.0).with_values({"solver.end_time": 0.5})
+    one, other = (simulate(scene, fidelity=fidelity) for fidelity in ("frame", "full"))
+    layout = layout_of(scene)
+    drawn = np.array([[layout.bodies[n].pose.place[2] for n in row] for row in layout.corners])
+    expected = drawn.mean(axis=1) - drawn.mean()
+    for run in (one, other):
+        assert isinstance(run, xr.Dataset)
+        assert run.corner_height.isel(time=0).values == pytest.approx(expected, abs=1e-12)
+    assert float(np.ptp(one.corner_height.dropna("time").values)) > 1e-3
+    assert float(np.abs(one.corner_height - other.corner_height).max()) < 1e-5
