@@ -104,7 +104,6 @@ class JacobianPattern:
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         turned = maps.transpose(0, 2, 1)
-        directions = np.empty((len(self._tensions), 3, 3))
         unit = state.directions
         across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
         directions = (state.tensions / state.lengths)[:, None, None] * across
@@ -127,7 +126,8 @@ class JacobianPattern:
         entries = self._entries[:count]
         entries[: self.unknowns, 2] = by_q
         np.multiply(values[self._kept], by_q, out=entries[self.unknowns : self._known, 2])
-        np.concatenate(parts, out=entries[self._known :])
+        if parts:  # none where all ropes are cut
+            np.concatenate(parts, out=entries[self._known :])
         return entries
 
     def _rope(
