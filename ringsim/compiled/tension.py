@@ -105,7 +105,7 @@ class Spans(NamedTuple):
 
     @classmethod
     def empty(cls, ropes: Ropes) -> "Spans":
-        """Of so many spans and pulleys."""
+        """Of ropes, not yet measured."""
         n, pulleys = ropes.spans, len(ropes.behind)
         one = np.zeros(n)
         return cls(one, one.copy(), np.zeros((n, 3)), np.zeros(pulleys), one.copy(), one.copy(),

@@ -165,7 +165,7 @@ def _pairs(rows: Indices, columns: Indices) -> tuple[Indices, Indices]:
 # Cables in the multibody model: their forces inside every Newton iteration.
 #
 # One exudyn object spans all nodes that the paths depend on.  Its force is the chain's, its
-# Jacobian that of ringsim.exudyn.cables.
+# Jacobian that of ``JacobianPattern``.
 
 
 class CableDrive:
@@ -176,7 +176,7 @@ class CableDrive:
     present, path
         The cables with their planes, and what they run over, on the model's nodes.
     chain, ropes, winches
-        See ringsim.cable; faults replace the ropes.
+        See ringsim.compiled.chain and ringsim.cable; faults replace the ropes.
     refusal
         Why the chain last had no answer to a state that Newton tried; empty if it always had.
     """

@@ -211,7 +211,6 @@ class Readings(Meters):
         damped = model.scene.rods.damping > 0.0
         self._dampers = {e: k for k, e in enumerate(elements)} if damped else {}
         self._known: dict[Places, tuple[SectionForces, list[int]]] = {}
-        self._solved = False
 
     @property
     def switches(self) -> Switches:
@@ -263,10 +262,8 @@ class Readings(Meters):
     def reaction(self) -> Array | None:
         """What exudyn's clamp of the ground carries, and of a spacecraft what accelerates it."""
         layout = self.layout
-        if not self._solved:  # the clamp has not been solved for yet
-            self._solved = True
-            if (first := first_reaction(layout, self._model.moving)) is not None:
-                return first
+        if self.now.time == 0.0:  # the clamp has not been solved for yet
+            return first_reaction(layout, self._model.moving)
         if self._clamp is not None:
             found = [self._system.GetObjectOutput(self._clamp, kind) for kind in _CLAMP]
             return np.asarray(_SENSES * found)

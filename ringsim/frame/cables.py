@@ -266,7 +266,7 @@ def pull_tight(
     spans: Spans,
 ) -> float:  # fmt: skip
     """Spans, with their tensions, at places and rates of the points; returns the least length, NaN
-    if no tensions go with the friction (``ringsim.compiled.chain``).
+    if no tensions go with the friction (``ringsim.compiled.tension``).
     """
     least, rows = measure(table, behind, places, rates, spans), laws.decays.rows
     slide(table, drums, spans)
@@ -361,7 +361,7 @@ def add_cables(
     pull_lines(lines, mesh, arms, factors[1], rows, first)
 
 
-# The cables on frames: the chain of ringsim.cable, its pulls on the unknowns and its tangent.
+# The cables on frames: the chain of ringsim.compiled, its pulls on the unknowns and its tangent.
 #
 # Spans between two frames pull on them; that their directions turn is part of the fronts.  How
 # tensions change couples all spans of a rope: dT = A dlog with few columns A (one for the mean

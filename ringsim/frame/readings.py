@@ -43,10 +43,11 @@ class Readings(Meters):
         self._first = np.cumsum([0, *(len(rod.lengths) for rod in rods)])
         self._stiffness: Array = model.mesh.stiffness[: self._first[-1]]  # behind: the boom
         self._known: dict[Places, Indices] = {}
-        self._balanced = False
         if model.scene.record.accelerations:
             for number in np.ravel(model.layout.corners):
                 weights_of(model.mesh, OnBody(int(number)))  # may refuse
+        if model.scene.record.positions:
+            _ = self._of_points  # likewise
 
     def at(self, state: State, strains: Strains) -> Self:
         """Measure this state, with its strains, from now on."""
@@ -100,8 +101,7 @@ class Readings(Meters):
         inertia of its points.
         """
         model, state = self._model, self._state
-        if not self._balanced:  # nothing has been out of balance yet
-            self._balanced = True
+        if self.now.time == 0.0:  # nothing has been out of balance yet
             return first_reaction(self.layout, model.moving)
         if self.layout.supports:
             return model.reaction.reshape(2, 3)

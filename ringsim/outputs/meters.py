@@ -34,8 +34,11 @@ class Meters:
     """Measures the state that a run goes on from.
 
     An engine gives the methods that raise here; the others follow from these.  Nothing is measured
-    unless an output asks for it, so that a run pays for what its scene records alone.
+    unless an output asks for it, so that a run pays for what its scene records alone.  What is told
+    is of the state that was read last, ``now``.
     """
+
+    now: Instant
 
     def __init__(self, scene: Scene, layout: Layout) -> None:
         self.scene, self.layout = scene, layout
@@ -71,7 +74,7 @@ class Meters:
 
     def reaction(self) -> Array | None:
         """Force (N) and torque (N m) of the base on the structure about the base's origin, shape
-        (2, 3); None of a base that floats alone.  It is asked for once a state.
+        (2, 3); None of a base that floats alone.
         """
         raise NotImplementedError
 
@@ -142,6 +145,7 @@ class Meters:
 
     def reading(self, now: Instant, chain: ChainState | None, cables: Any) -> "Reading":
         """What outputs read of an instant in this state, with its ropes and the model's cables."""
+        self.now = now
         planes = () if cables is None else tuple((plane,) for plane, _ in cables.present)
         return Reading(**vars(now), meters=self, chain=chain, planes=planes)
 

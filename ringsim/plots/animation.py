@@ -23,7 +23,7 @@ from PIL import Image
 
 from ringsim.files import whole, writing
 from ringsim.plots import style
-from ringsim.plots.ring import LOOKS, facing_azimuth, view
+from ringsim.plots.ring import LOOKS, OTHER, facing_azimuth, view
 from ringsim.plots.run import LEAST_SPAN
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
@@ -145,7 +145,7 @@ def _draw(lines: LineCollection, shape: Shape, paint: _Paint, time: float, azimu
     unknown = {name: np.full(len(ends), np.nan) for name, ends in parts.items()}
     known = {name: each for name, each in values.items() if name in parts}
     told = paint.factor * np.concatenate([*(unknown | known).values()])
-    looks = [LOOKS.get(name, {"color": style.GREY, "linewidth": 1.5}) for name in names]
+    looks = [LOOKS.get(name, OTHER) for name in names]
     colours = np.array([to_rgb(look["color"]) for look in looks])
     widths = np.array([look["linewidth"] for look in looks])
     colours[np.isin(names, ("diagonals", "bars"))] = to_rgb(_MUTED)

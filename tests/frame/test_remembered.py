@@ -74,7 +74,7 @@ def inside(thing: Any) -> dict[Any, Any] | None:
         own = {name: one for name, one in own.items() if name not in ("_start", "_held", "_ropes")}
     if isinstance(thing, Readings):
         # They look at a state when it is read.
-        own = {name: one for name, one in own.items() if name not in ("_state", "_strains")}
+        own = {name: one for name, one in own.items() if name not in ("now", "_state", "_strains")}
     return own
 
 
