@@ -40,14 +40,44 @@ def read_text(path: Path | Traversable) -> str:
         raise InputError(f"{path}: cannot be read: {reason}") from None
 
 
+_DEEPEST = 100
+"""Levels of lists and tables: what a scene or a campaign holds has ten."""
+
+
+def _depth(found: Any) -> int:
+    """Levels of lists and tables in each other."""
+    depth, level = 0, [found]
+    while level := [v for each in level for v in _inside(each)]:
+        depth += 1
+    return depth
+
+
+def _inside(found: Any) -> list[Any]:
+    return list(
+        found.values() if isinstance(found, dict) else found if isinstance(found, list) else ()
+    )
+
+
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The tables of a TOML text; an InputError begins with ``source``.
 
     >>> parse_toml("loads.force = 0.02", "ring.toml")
     {'loads': {'force': 0.02}}
     """
+    for number, line in enumerate(text.splitlines(), 1):
+        head, sign, _ = line.partition("=")
+        # Before it is read: a key of a million parts takes a minute.
+        if (
+            head.count(".") > _DEEPEST
+            and (sign or head.lstrip().startswith("["))
+            and "," not in head
+        ):
+            raise InputError(f"{source}: line {number}: a key of more than {_DEEPEST} parts")
     try:
-        return tomllib.loads(text)
+        found = tomllib.loads(text)
+        if _depth(found) > _DEEPEST:
+            raise RecursionError
+        return found
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source}: not valid TOML: {error}; correct that line") from None
     except RecursionError:

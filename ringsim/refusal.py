@@ -15,6 +15,8 @@ from ringsim.units import LEFT_OUT, Model, nested_in, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
+_MOST_KNOWN = 30
+"""Names that a hint lists: more than a table of a scene or campaign has keys."""
 LONGEST_VALUE = 60
 """Characters of a refused value that are shown."""
 
@@ -52,6 +54,8 @@ _SAYS = {
 def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
     """One line that begins with ``source``: the first fault in full, then where the others are."""
     faults = error.errors(include_url=False)
+    # A key that is none first: it may be the one that is missing, misspelt.
+    faults.sort(key=lambda fault: fault["type"] != "extra_forbidden")
     line = f"{source}: {_describe(faults[0], model)}"
     others = list(dict.fromkeys(_place(fault, model) for fault in faults[1:]))
     if not others:
@@ -75,7 +79,10 @@ def known_or_nearest(key: str, known: Iterable[str]) -> str:
     # Of several that begin alike the shortest: what it is, before its time or its angle.
     close = sorted((name for name in close if close[0].startswith(name)), key=len)
     close += [name for name in names if key and name.startswith(key.lower())]
-    return f"did you mean {close[0]}?" if close else f"known: {', '.join(names)}"
+    if close:
+        return f"did you mean {close[0]}?"
+    more = f" and {len(names) - _MOST_KNOWN} more" if len(names) > _MOST_KNOWN + 5 else ""
+    return f"known: {', '.join(names[:_MOST_KNOWN] if more else names)}{more}"
 
 
 def show(value: Any) -> str:
@@ -136,6 +143,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         return f"{shown}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
     in_unit = f" in{unit}" if unit else ""
     line = says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
+    if unit == " K" and number and value <= 0.0:
+        return f"{line}; {value:g} C are {value + 273.15:g} K"
     if not isinstance(value, str):
         return line
     if meant := _meant(value, kind):

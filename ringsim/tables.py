@@ -81,6 +81,19 @@ def interval_text(low: float, high: float, digits: int = 4) -> str:
     return f"{number_text(low, digits)} .. {number_text(high, digits)}" if known else "-"
 
 
+def size_text(size: float) -> str:
+    """Bytes with two digits or three.
+
+    >>> size_text(48047.0), size_text(5.2e6), size_text(312e9)
+    ('48 kB', '5.2 MB', '312 GB')
+    """
+    unit = "B"
+    for larger in ("kB", "MB", "GB", "TB"):
+        if size >= 999.5:
+            size, unit = size / 1000.0, larger
+    return f"{size:.{2 if size < 99.5 else 3}g} {unit}"
+
+
 def chance_text(probability: float) -> str:
     """A probability that is of interest if it is small, as "p = 0.03"."""
     return f"p = {probability:.2g}" if round(probability, 4) else "p < 0.0001"

@@ -23,6 +23,12 @@ class Ring:
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
+    def __repr__(self) -> str:
+        """What it is of, and what it can be asked."""
+        kind = "campaign" if "sample" in self._dataset.dims else "run"
+        asked = [f"{n}()" for n, word in vars(Ring).items() if n[0] != "_" and callable(word)]
+        return f"ring of a {kind}: ask {', '.join(asked)}"
+
     def leader(self) -> xr.Dataset:
         """Which V-joint is most open and which least.
 
@@ -117,8 +123,8 @@ class Ring:
     def fan(self, quantiles: tuple[float, ...] = (0.0, 0.05, 0.5, 0.95, 1.0)) -> xr.DataArray:
         """Quantiles over the samples of each V-joint's deviation from the mean opening angle.
 
-        Along (quantile, plane, section, time), degree.  Runs that are over count on: deployed rings
-        have no deviation, others that of their last record.
+        Along (quantile, plane, section, time), degree.  After its end a run that deployed counts as
+        in step, any other with the deviation of its last record.
 
         InputError if it is no campaign, or no sample has recorded opening angles.
         """

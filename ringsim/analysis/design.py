@@ -5,7 +5,7 @@ import hashlib
 import json
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -348,6 +348,8 @@ class Drawn:
     """Of each column: "input"; of one that has many places "mean", "quarter" and "place"."""
     input: tuple[str, ...]
     """Of each column the name of its input."""
+    span: tuple[tuple[int, int], ...]
+    """Of each column the first of its places and the one behind the last; 0, 0 without places."""
 
 
 def drawn(campaign: xr.Dataset) -> Drawn:
@@ -355,7 +357,7 @@ def drawn(campaign: xr.Dataset) -> Drawn:
     share is one column; inputs of other names that are alike in all samples are one, too, which has
     both names, since nothing tells them apart.
     """
-    found: dict[str, tuple[Array, str, str]] = {}
+    found: dict[str, tuple[Array, str, str, tuple[int, int]]] = {}
     for variable in (campaign[name] for name in inputs(campaign)):
         if variable.attrs.get("path") == "solver.error_bars":
             continue
@@ -365,33 +367,58 @@ def drawn(campaign: xr.Dataset) -> Drawn:
             if values.ndim == 1 and len(words) <= _MOST_WORDS:
                 for word in words[: 1 if len(words) == 2 else None]:
                     is_so = (values.astype(str) == word).astype(float)
-                    found[f"{own} = {word}"] = is_so, "input", own
+                    found[f"{own} = {word}"] = is_so, "input", own, (0, 0)
         elif values.ndim == 1:
-            found[own] = values.astype(float), "input", own
+            found[own] = values.astype(float), "input", own, (0, 0)
         else:
             numbers = values.astype(float)
-            found[f"mean of {own}"] = numbers.mean(axis=1), "mean", own
-            if (count := numbers.shape[1]) >= _LEAST_QUARTERED:
-                for low, high in stretches(count, 4):
-                    mean = numbers[:, low:high].mean(axis=1)
-                    found[f"mean of {own}[{low + 1}..{high}]"] = mean, "quarter", own
+            count = numbers.shape[1]
+            found[f"mean of {own}"] = numbers.mean(axis=1), "mean", own, (0, count)
+            for low, high in stretches(count, 4) if count >= _LEAST_QUARTERED else ():
+                mean = numbers[:, low:high].mean(axis=1)
+                name = f"{places_called(variable)} {low + 1} to {high} of {own}"
+                found[name] = mean, "quarter", own, (low, high)
             for k, place in enumerate(place_names(campaign, variable)):
-                found[f"{own}[{place}]"] = numbers[:, k], "place", own
-    kept: dict[bytes, tuple[list[str], Array, str, list[str]]] = {}
-    for name, (column, level, own) in found.items():
+                found[f"{own}[{place}]"] = numbers[:, k], "place", own, (k, k + 1)
+    kept: dict[bytes, tuple[list[str], Array, str, tuple[int, int], list[str]]] = {}
+    for name, (column, level, own, span) in found.items():
         if np.ptp(column) > 0:
             key = hashlib.blake2b(column.tobytes()).digest()
-            names, _, _, owners = kept.setdefault(key, ([], column, level, []))
+            names, *_, owners = kept.setdefault(key, ([], column, level, span, []))
             if own not in owners:  # the mean of one place is that place
                 names.append(name)
                 owners.append(own)
     count = campaign.sizes["sample"]
-    values = np.array([column for _, column, _, _ in kept.values()]).reshape(-1, count).T
+    values = np.array([column for _, column, *_ in kept.values()]).reshape(-1, count).T
     return Drawn(
         tuple(" and ".join(names) for names, *_ in kept.values()), values,
-        tuple(level for _, _, level, _ in kept.values()),
+        tuple(level for _, _, level, *_ in kept.values()),
         tuple(owners[0] for *_, owners in kept.values()),
+        tuple(span for _, _, _, span, _ in kept.values()),
     )  # fmt: skip
+
+
+def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) -> list[str]:
+    """Of columns, the strongest first, those that share no place with a stronger one.
+
+    ``places`` are the input of each, its first place and the one behind its last.
+
+    >>> places = {"mean": ("cable", 0, 8), "5 to 8": ("cable", 4, 8), "[1]": ("cable", 0, 1)}
+    >>> strongest(["5 to 8", "mean", "[1]"], places)
+    ['5 to 8', '[1]']
+    """
+    kept = list[str]()
+    for name in names:
+        own, low, high = places.get(name, (name, 0, 0))
+        others = (places.get(each, (each, 0, 0)) for each in kept)
+        if not any(own == its and max(low, first) < min(high, end) for its, first, end in others):
+            kept.append(name)
+    return kept
+
+
+def places_called(variable: xr.DataArray) -> str:
+    """What the places of an input are, as "pulleys"."""
+    return f"{str(variable.dims[1]).replace('_', ' ')}s"
 
 
 def place_names(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:
@@ -436,6 +463,26 @@ def any_finite(campaign: xr.Dataset, name: str) -> bool:
 MERGED = "campaign.nc"
 
 
+_NOT_RUN = -1
+
+
+def _require_codes(found: xr.Dataset, file: Path) -> None:
+    """Refuse (InputError) statuses and outcomes that there are not."""
+    for name, kind in (("status", Status), ("outcome", Fate)):
+        if name not in found or found[name].dtype.kind not in "iuf":
+            continue
+        values = found[name].to_numpy().ravel()
+        known = [_NOT_RUN, *(int(each) for each in kind)]
+        wrong = values[np.isfinite(values) & ~np.isin(values, known)]
+        if len(wrong):
+            found.close()
+            raise InputError(
+                f"{file}: {name} holds {wrong[0]:g}, which means nothing here (known: "
+                f"{min(known)} .. {max(known)}): the file is damaged, or of another version of "
+                "ringsim: merge again"
+            )
+
+
 def open_stored(path: Path) -> xr.Dataset:
     """The dataset in a file, or of the campaign in a folder, loaded only as far as it is used.
 
@@ -459,7 +506,6 @@ def open_stored(path: Path) -> xr.Dataset:
         for variable in found.variables.values():
             if len(variable.dims) < 2:
                 variable.load()
-        return found
     except FileNotFoundError:
         raise InputError(
             f"{file}: there is no such file or folder: check its name, and the folder that you are "
@@ -476,3 +522,5 @@ def open_stored(path: Path) -> xr.Dataset:
             f"{file}: cannot be read as a netCDF file: {reason}; give a file that ringsim has "
             "written"
         ) from None
+    _require_codes(found, file)
+    return found

@@ -208,6 +208,14 @@ def influence(
         "input", _held(np.array(inputs.level)),
         about("other inputs that its partial correlations hold"),
     )  # fmt: skip
+    found["input_of"] = (
+        "input", np.array(inputs.input, dtype=object),
+        {"long_name": "input that it is a mean, a place or a word of"},
+    )  # fmt: skip
+    found["input_span"] = (
+        ("input", "bound"), np.array(inputs.span, dtype="i8"),
+        about("first of its places, and the one behind the last"),
+    )  # fmt: skip
     found |= confounded(inputs, ok)
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
     if groups:

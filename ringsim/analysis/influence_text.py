@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from ringsim.analysis import indices
+from ringsim.analysis.design import strongest
 from ringsim.analysis.indices import UNLIKELY
 from ringsim.analysis.influence import confounding_notes, partners
 from ringsim.analysis.intervals import LEVEL, quantities
@@ -90,17 +91,20 @@ def _separated(analysis: xr.Dataset) -> Table:
     return marked(Table(head, rows, notes), analysis)
 
 
-DIRECTED = ("it is", "with probability", "95 % interval")
+DIRECTED = ("beside the others it is", "95 % interval")
 """Heads of ``directed``."""
 
 
-def directed(middle: Array, ends: Array, k: int) -> tuple[str, str, str]:
-    """Whether an input is larger or smaller in a group than in the rest, with which probability (of
-    a sample of each), and its interval.
+def directed(middle: Array, ends: Array, k: int) -> tuple[str, str]:
+    """In what share of pairs, of a sample of the group and one of the rest, an input is larger (or
+    smaller) in that of the group, as "larger in 98 % of pairs", and the interval in percent.
     """
-    if middle[k] >= 0.5:
-        return "larger", *_with_interval(middle, ends, k)
-    return "smaller", *_with_interval(1.0 - middle, 1.0 - ends[:, ::-1], k)
+    word = "larger" if middle[k] >= 0.5 else "smaller"
+    if word == "smaller":
+        middle, ends = 1.0 - middle, 1.0 - ends[:, ::-1]
+    low, high = 100.0 * ends[k]
+    # Three digits: two would make 1e+02 of 99.6.
+    return f"{word} in {100.0 * middle[k]:.3g} % of pairs", interval_text(low, high, 3)
 
 
 def _largest(values: Array, place: NDArray[np.bool_]) -> list[int]:
@@ -315,6 +319,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
     for output in [n for n in quantities() if n in told or n in known] + groups:
         found = told[output] if output in told else list(_ranked(analysis, output))
         found, others = _cleared(analysis, output, found)
+        found = _apart(analysis, found)
         doubtful += [f"{output} by {name}" for name in others[:_MOST_IN_SHORT]]
         rows += [(output if k == 0 else "", *row) for k, row in enumerate(found[:_MOST_IN_SHORT])]
         if not found:
@@ -322,9 +327,10 @@ def what_matters(analysis: xr.Dataset) -> Table:
     notes = measure_notes(analysis)
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         count = analysis.sizes["input"]
-        largest = f"the largest of all {count} would reach" if count > 1 else "it would reach"
+        whose = f"any of {count} inputs" if count > 1 else "the input"
         notes.append(
-            f"an input is told if by chance {largest} as much in fewer than one output of 20"
+            f"only links as strong as {whose} would have by chance in fewer than one output of 20; "
+            "where a mean and its parts both have one, the stronger"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
@@ -333,7 +339,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
             f"rank correlation is within chance): {', '.join(doubtful)}"
         )
     if quiet:
-        notes.append(f"no input stands out of chance for {', '.join(quiet)}")
+        notes.append(f"no input matters more than chance would explain for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
     return marked(Table(head, rows, notes, left=2), analysis, 1)
@@ -386,6 +392,18 @@ def _cleared(
         else:
             others.append(row[0])
     return kept, others
+
+
+def _apart(analysis: xr.Dataset, found: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """The rows, the largest first, without those that contain a larger one or lie within it: the
+    mean of all pulleys beside that of five of them tells the same twice.
+    """
+    if "input_of" not in analysis:
+        return found
+    columns = (analysis[name].values.tolist() for name in ("input", "input_of", "input_span"))
+    places = {name: (own, *span) for name, own, span in zip(*columns, strict=True)}
+    kept = strongest([row[0] for row in found], places)
+    return [row for row in found if row[0] in kept]
 
 
 def _correlated(analysis: xr.Dataset) -> list[str]:

@@ -48,6 +48,26 @@ def quantile(values: Array, probability: float | Sequence[float]) -> Array:
     return np.asarray(np.quantile(values, probability, axis=-1))
 
 
+NOTHING = 1e-12
+"""Size in SI units below which a number is what rounding leaves: that of numbers of order one,
+1e-16, after some thousand operations.  Nothing that a ring's outputs are told in is so small."""
+_ROUND_OFF = 1e-9
+"""Range over the largest value below which values differ by rounding alone: steps are found to no
+more digits."""
+
+
+def all_alike(least: Array | float, most: Array | float) -> Any:
+    """Whether values of that range are the same but for rounding, each of them.
+
+    >>> bool(all_alike(19.999999999999996, 20.0)), bool(all_alike(-1e-17, 3e-17))
+    (True, True)
+    >>> bool(all_alike(0.25, 0.26))
+    False
+    """
+    largest = np.maximum(np.abs(least), np.abs(most))
+    return (np.subtract(most, least) <= _ROUND_OFF * largest) | (largest < NOTHING)
+
+
 def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
     """Interval of the mean (``np.mean``) or of the ``spread`` of independent samples.
 
@@ -60,7 +80,7 @@ def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array,
         return none, none
     if count > LARGE:
         return _limit(values, statistic)
-    alike = values.min(axis=-1) == values.max(axis=-1)
+    alike = np.asarray(all_alike(values.min(axis=-1), values.max(axis=-1)))
     # Values that are all alike have no bootstrap distribution: they are told as they are.
     told = np.where(alike[..., None], np.arange(count), values)
     known = statistic(values, axis=-1)

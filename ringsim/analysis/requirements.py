@@ -153,7 +153,7 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
     table: dict[str, dict[str, Any]] = {}
     for text in texts:
         name, found, rest = re.match(r"\s*(\w*)\s*([:=]?)(.*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
-        parts = [re.fullmatch(r"(\w+)[\s=]+(\S+)", part.strip()) for part in rest.split(",")]
+        parts = [re.fullmatch(_BOUND, part.strip()) for part in rest.split(",")]
         if not name or not found or None in parts:
             raise InputError(
                 f"--require {show(text)}: must read NAME: KEY VALUE, KEY VALUE, ..., for example "
@@ -162,8 +162,26 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
             )
         if name in table:
             raise InputError(f"--require {name} is given twice: leave out one of the two")
+        for part in parts:
+            _require_unit(name, part[1], part[2], part[3])  # type: ignore[index]
         table[name] = {part[1]: _value(part[2]) for part in parts if part}
     return read_requirements(table, "--require")
+
+
+_BOUND = r"(\w+)(?:\s*=\s*|\s+)(\S+)(?:\s+(\S+))?"
+"""A key, its value, and for a bound perhaps its unit."""
+_SHORT = {"deg": "degree"}
+
+
+def _require_unit(name: str, key: str, value: str, unit: str | None) -> None:
+    """Refuse (InputError) a unit behind a bound that is not the output's: nothing is converted."""
+    if unit is None or name not in quantities():
+        return
+    own = quantities()[name].units
+    if key not in ("max", "min") or _SHORT.get(unit, unit) != own:
+        cure = f"in {own}" if unit_text(own) else "as a number without a unit"
+        cure = cure if key in ("max", "min") else "without a unit"
+        raise InputError(f"--require {name}: {key} = {value} {unit}: give it {cure}")
 
 
 def _value(word: str) -> Any:

@@ -15,7 +15,14 @@ from ringsim.analysis.influence_text import (
     what_matters,
     what_separates,
 )
-from ringsim.analysis.intervals import LEAST_OF_BOOTSTRAP, numbers, quantities, ranks
+from ringsim.analysis.intervals import (
+    LEAST_OF_BOOTSTRAP,
+    NOTHING,
+    all_alike,
+    numbers,
+    quantities,
+    ranks,
+)
 from ringsim.analysis.requirements import OUTCOME, required_by
 from ringsim.analysis.reweighting import (
     LEAST_OF_MEAN,
@@ -30,7 +37,15 @@ from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
 from ringsim.analysis.worst import MARK, NOTE, losses, marked, worst_lines, worst_tables
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import label_of
-from ringsim.tables import Table, counted, interval_text, number_text, slim, unit_text
+from ringsim.tables import (
+    Table,
+    counted,
+    interval_text,
+    number_text,
+    slim,
+    unit_text,
+    with_unit,
+)
 
 # Estimates for other distributions of inputs, as lines for people.
 
@@ -211,6 +226,15 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
     return [*lines, *verdict_table(found.assign_attrs({NOTE: lost.note})).lines()]
 
 
+def not_met(analysis: xr.Dataset) -> list[str]:
+    """The requirements that are not met, or not yet shown to be, each with its verdict."""
+    if "requirement" not in analysis.dims:
+        return []
+    codes, texts = (analysis[name].values for name in ("verdict", "requirement_text"))
+    each = zip(codes, texts, strict=True)
+    return [f"{text} is {Verdict(code).words}" for code, text in each if code != Verdict.MET]
+
+
 def verdict_table(analysis: xr.Dataset) -> Table:
     """The verdicts, a row a requirement; no rows without requirements."""
     rows, notes = [], list[str]()
@@ -279,15 +303,16 @@ def _parts() -> list[str]:
 
 def statistics_table(analysis: xr.Dataset) -> Table:
     """Mean with its interval, scatter, quantiles and range of each output, and its worst sample."""
-    rows, few = [], False
+    rows, few, alike = [], False, list[str]()
     for name in outputs_in(analysis):
         values, counts = analysis[name].values, analysis[f"{name}_samples"].values
         mean, deviation, *quantiles, least, most = values
         used, run = counts[0], counts[:3].sum()  # what has not run is the last
         count = str(used) if used == run else f"{used} of {run}"
         units = unit_text(analysis[name].attrs["units"])
-        if least == most:
-            rows.append((name, units, number_text(least), "all alike", *"------", "-", count))
+        if all_alike(least, most):
+            value = "0" if abs(most) < NOTHING else with_unit(number_text(most), units or "1")
+            alike.append(f"{name} {value}" + f" (in {count})" * int(used < run))
         elif np.isfinite(least):
             fine = digits_of(least, most)
             low, high = analysis[f"{name}_interval"].values[0].tolist()
@@ -303,7 +328,8 @@ def statistics_table(analysis: xr.Dataset) -> Table:
         "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
         "most", "worst sample", "used",
     )  # fmt: skip
-    return marked(Table(head, rows, [too_few()] * few), analysis)
+    notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
+    return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
 
 
 def too_few() -> str:
@@ -335,18 +361,19 @@ def every_statistic(analysis: xr.Dataset) -> Table:
         for k, statistic in enumerate(STATISTICS):
             value = values[k]
             # What is alike in all samples takes one row.
-            if np.isnan(value) or (least == most and statistic != "maximum"):
+            same = all_alike(least, most)
+            if np.isnan(value) or (same and statistic != "maximum"):
                 continue
             digits = 4 if statistic == "standard_deviation" else fine
             first = analysis[f"{name}_convergence"].values[:-1, k]
             low, high = analysis[f"{name}_interval"].values[k].tolist()
             side, who = k - len(STATISTICS) + 2, ("-", "-")
-            if side >= 0 and least < most:
+            if side >= 0 and not same:
                 bar = analysis[f"{name}_end_error"].values[side]
                 who = str(analysis[f"{name}_end_sample"].values[side]), number_text(bar, 2)
             rows.append((
                 name, units,
-                "all" if least == most else statistic.replace("_", " "), number_text(value, digits),
+                "all" if same else statistic.replace("_", " "), number_text(value, digits),
                 interval_text(low, high, digits), *who,
                 *(number_text(v, digits) for v in first), used, lost, absent,
             ))  # fmt: skip
@@ -374,7 +401,7 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         )
         mean, *_, least, most = analysis[name].values
         known = np.isfinite(errors)
-        if not (known.any() and np.isfinite(mean) and least < most):
+        if not (known.any() and np.isfinite(mean)) or all_alike(least, most):
             continue
         every |= bool(known[1:].any())
         cells = [number_text(errors[0], 2)]
@@ -411,7 +438,7 @@ def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
         return "-"
     unknown = [name for name, k in zip(SOURCES, known, strict=True) if not k]
     found = SOURCES[int(np.nanargmax(errors))]
-    return f"{found} ({', '.join(unknown)} unknown)" if unknown else found
+    return f"{found} ({' and '.join(unknown)} not measured)" if unknown else found
 
 
 def error_lines(campaign: xr.Dataset) -> list[str]:

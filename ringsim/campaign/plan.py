@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.analysis.design import placement_of
+from ringsim.analysis.design import MERGED, placement_of
 from ringsim.analysis.influence import pairs
 from ringsim.campaign.folder import digests, opened_as
 from ringsim.campaign.run import Order, grown
@@ -20,7 +20,7 @@ from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.distributions import labels_of
 from ringsim.storage.journal import Survey, survey
 from ringsim.storage.result import Result, check_of, sample_of
-from ringsim.tables import counted
+from ringsim.tables import counted, size_text
 
 Samples = NDArray[np.int64]
 _MOST_SHOWN = 10
@@ -65,8 +65,13 @@ def plan(order: Order, workers: int) -> list[str]:
         numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
         looks = ", ".join(map(str, numbers)) or "none before the last sample"
         lines.append(f"  looks          {looks} (stop_when)")
-    each, told = _predicted(order, table, found, todo, lambda sample: sample)
+    each, told, size = _predicted(order, table, found, todo, lambda sample: sample)
     lines += [f"  cost           {words}" for words in told]
+    if len(each):
+        whole = f"{size_text(size * table.samples)} for all"
+        lines.append(
+            f"  disk           {size_text(size)} a sample, {whole}, once or twice that for {MERGED}"
+        )
     most = 0.0
     if isinstance(design, SubsetSimulation) and not design.ended:
         done = table.samples - len(found.missing)
@@ -81,7 +86,7 @@ def plan(order: Order, workers: int) -> list[str]:
             f"  checks         {len(checked)} samples with the full engine, too, {len(open_)} to "
             "run here"
         )
-        own, told = _predicted(order, table, judged, open_, check_of)
+        own, told, _ = _predicted(order, table, judged, open_, check_of)
         lines += [f"  cost of checks {words}" for words in told]
         each = np.concatenate([each, own])
     if not len(each):
@@ -94,15 +99,19 @@ def plan(order: Order, workers: int) -> list[str]:
 
 def _predicted(
     order: Order, table: Table, found: Survey, todo: Samples, number: Callable[[int], int]
-) -> tuple[Array, list[str]]:
-    """Time of each run (s), and in words; ``number`` is that of a sample's run."""
+) -> tuple[Array, list[str], float]:
+    """Time of each run (s), that in words, and bytes that a run takes in the journals; ``number``
+    is that of a sample's run.
+    """
     if not len(todo):
-        return np.empty(0), []
+        return np.empty(0), [], 0.0
     campaign, cost = order.campaign, relative_cost(table, order.campaign.scene)
     known = np.flatnonzero(np.isfinite(found.seconds))
     if len(known):
         per_cost = float(found.seconds[known].sum() / cost[known].sum())
         basis = f"from {len(known)} samples that are done"
+        written = (file.stat().st_size for file in (order.folder / "journals").iterdir())
+        size = sum(written) / len(known)
     else:
         trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
         kept: list[Result] = []
@@ -116,11 +125,12 @@ def _predicted(
         Local(1).run([number(trial)] * 2, work)
         result = kept[-1]
         per_cost = result.seconds / cost[trial]
+        size = float(len(result.body) + len(result.header()))
         basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
     each = per_cost * cost[todo]
     ends = f"{each.min():.3g}", f"{each.max():.3g}"
     spread = f" ({ends[0]} to {ends[1]} s)" if ends[0] != ends[1] else ""
-    return each, [f"{each.mean():.3g} s each{spread}, {basis}"]
+    return each, [f"{each.mean():.3g} s each{spread}, {basis}"], size
 
 
 def _confounded(table: Table) -> list[str]:

@@ -15,6 +15,7 @@ from ringsim.campaign.plan import plan
 from ringsim.campaign.run import Order, Share, require_no_launcher, start
 from ringsim.campaign.specification import campaign_of, load_campaign
 from ringsim.campaign.stopping import is_behind, merge
+from ringsim.choice import kind_of
 from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
@@ -70,6 +71,16 @@ class Campaign:
         if given is not None:
             text += "\n# The scene was given as an object: the attribute scene holds all of it."
         self._described = campaign_of(text, Path(_NAME), scene=given)
+
+    def __repr__(self) -> str:
+        """Name, design, scene and inputs, in one line."""
+        asked = self._described.specification
+        design = ", ".join(f"{k} {v}" for k, v in asked.design.model_dump().items() if k != "kind")
+        inputs = ", ".join(asked.inputs) or "none"
+        return (
+            f"Campaign({asked.name!r}: scene {self._described.scene.name}; design "
+            f"{kind_of(asked.design)}, {design}; inputs {inputs})"
+        )
 
     @classmethod
     def read(

@@ -17,7 +17,7 @@ from ringsim.files import whole
 from ringsim.storage.result import Result, sample_of
 from ringsim.tables import counted
 
-_STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+_STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 _PLAIN_SECONDS = 30.0
 _FILE_SECONDS = 1.0
 
@@ -53,12 +53,14 @@ def stopping_on_signals() -> Iterator[StopRequest]:
 
     def note(number: int, _frame: Any) -> None:
         stop.note(f"stopped by {signal.Signals(number).name}", signalled=True)
-        for each in _STOPPERS:
-            signal.signal(each, before[each])
+        for each, handler in before.items():
+            signal.signal(each, handler)
         if stop.at_once:
             raise KeyboardInterrupt
 
-    before = {each: signal.signal(each, note) for each in _STOPPERS}
+    # nohup has a campaign go on when its terminal is closed.
+    kept = [signal.SIGHUP] if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else []
+    before = {each: signal.signal(each, note) for each in _STOPPERS if each not in kept}
     try:
         yield stop
     finally:

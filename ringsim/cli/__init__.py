@@ -87,18 +87,21 @@ def cli() -> None:
     """How large deployable ring antennas open: simulations and campaigns.
 
     Exit codes: 0 done, 2 bad input, 3 the simulation failed or too many samples did,
-    130 interrupted (run again to resume).
+    4 a requirement not met (analyse --gate), 130 interrupted (run again to resume).
     """
     logging.basicConfig(format="%(message)s")
 
 
 class _Told:
-    """Standard output whose reader may stop reading (``ringsim run ... | head``): what a verb was
-    called for is done all the same.
+    """Standard output whose reader may stop reading (``ringsim run ... | head``), or which is
+    closed or full: what a verb was called for is done all the same.
     """
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+    def __init__(self, stream: TextIO | None) -> None:
+        # A descriptor of its own: that of a closed standard output may be any file's by now.
+        self._stream = open(os.devnull, "w") if stream is None else stream  # noqa: SIM115
+        self.lost = ""
+        """Why what was said could not be written; empty if it was, or if nobody reads."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -107,18 +110,20 @@ class _Told:
         """Write, to nowhere once nobody reads."""
         try:
             return self._stream.write(text)
-        except BrokenPipeError:
-            self._go_nowhere()
+        except OSError as error:
+            self._go_nowhere(error)
             return len(text)
 
     def flush(self) -> None:
         """Hand over what is written."""
         try:
             self._stream.flush()
-        except BrokenPipeError:
-            self._go_nowhere()
+        except OSError as error:
+            self._go_nowhere(error)
 
-    def _go_nowhere(self) -> None:
+    def _go_nowhere(self, error: OSError) -> None:
+        if not isinstance(error, BrokenPipeError):
+            self.lost = error.strerror or str(error)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self._stream.fileno())
         os.close(nowhere)
@@ -126,7 +131,7 @@ class _Told:
 
 def main() -> None:
     """The command ``ringsim``, see ``ringsim.__main__``."""
-    sys.stdout = _Told(sys.stdout)
+    sys.stdout = out = _Told(sys.stdout)
     try:
         code = cli(standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
@@ -141,4 +146,8 @@ def main() -> None:
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted", err=True)
         code = EXIT_INTERRUPTED
+    out.flush()
+    if out.lost:
+        click.echo(f"standard output cannot be written: {out.lost}", err=True)
+        code = code or EXIT_BAD_INPUT
     sys.exit(code or EXIT_DONE)

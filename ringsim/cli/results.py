@@ -25,6 +25,7 @@ from ringsim.cli.options import (
     write_animation,
 )
 from ringsim.dataset import require_file, save
+from ringsim.exit_codes import EXIT_DONE, EXIT_NOT_MET
 from ringsim.files import require_place, writing
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
@@ -80,34 +81,49 @@ def merge_command(folder: Path) -> None:
     help="Tell the interval and the convergence of every statistic, and every measure of what "
     "matters, whatever chance would explain.",
 )  # fmt: skip
+@click.option(
+    "--gate", is_flag=True,
+    help="End with exit code 4 unless every requirement is met; one that is not yet shown is not.",
+)  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, help="Write all of it to a netCDF file.")
 def analyse_command(
-    source: Path, required: tuple[str, ...], reweighted: tuple[str, ...], full: bool,
+    source: Path, required: tuple[str, ...], reweighted: tuple[str, ...], full: bool, gate: bool,
     out: Path | None,
-) -> None:  # fmt: skip
+) -> int:  # fmt: skip
     """Say what the campaign in DIR (or its campaign.nc) tells: verdicts on requirements, shares of
     outcomes, statistics of outputs with intervals that fit the design, which error dominates, and
     which inputs matter.
 
-    Exit codes: 0 done, whatever the verdicts; 2 bad input.
+    Exit codes: 0 done, whatever the verdicts without --gate; 2 bad input; 4 with --gate if not all
+    requirements are met.
     """
     from ringsim.analysis.reweighting import parse_reweighted
     from ringsim.analysis.study import analyse
-    from ringsim.analysis.study_text import told
+    from ringsim.analysis.study_text import not_met, told
 
     others = parse_reweighted(reweighted)
     wanted = parse_requirements(required)
     if out is not None:
         require_file(out)
     with opened(source) as campaign:
+        wanted = required_by(campaign.attrs) | wanted
+        if gate and not wanted:
+            raise InputError(
+                f"--gate: {source} has no requirements to meet: give some under [requirements], or "
+                "with --require"
+            )
         try:
-            found = analyse(campaign, required_by(campaign.attrs) | wanted, others)
+            found = analyse(campaign, wanted, others)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
     folder = source if source.is_dir() else source.parent
     for line in told(found, str(folder), full=full):
         click.echo(line)
     _save(found, out)
+    if gate and (failing := not_met(found)):
+        click.echo(f"gate closed: {'; '.join(failing)}", err=True)
+        return EXIT_NOT_MET
+    return EXIT_DONE
 
 
 def _save(found: xr.Dataset, out: Path | None) -> None:

@@ -37,7 +37,7 @@ def main() -> None:
         os._exit(0)
     faulthandler.enable()
     faulthandler.register(signal.SIGUSR2)
-    for ignored in (signal.SIGINT, signal.SIGUSR1):
+    for ignored in (signal.SIGINT, signal.SIGHUP, signal.SIGUSR1):
         signal.signal(ignored, signal.SIG_IGN)
     try:
         _serve(pipe, pipe.recv())

@@ -109,7 +109,7 @@ def _blocks(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[xr.Dataset]:
 
 def _table(block: xr.Dataset, dims: tuple[str, ...]) -> Any:
     """A pandas table of a block, with units in its headers."""
-    told = block.map(in_words, keep_attrs=True)
+    told = block.map(in_words, keep_attrs=True).map(_no_formula, keep_attrs=True)
     if not dims:
         return told.expand_dims("row").to_dataframe().rename(columns=_headers(block))
     numbers = [n for n, v in told.data_vars.items() if v.dtype.kind == "f"]
@@ -117,6 +117,21 @@ def _table(block: xr.Dataset, dims: tuple[str, ...]) -> Any:
     if "time" in dims and len(numbers) == len(told.data_vars):
         table = table.dropna(how="all", subset=numbers)
     return table.reset_index().rename(columns=_headers(block))
+
+
+def _no_formula(variable: xr.DataArray) -> xr.DataArray:
+    """Words that spreadsheets would compute have an apostrophe before them, which these hide.
+
+    Source: OWASP, CSV injection.
+    """
+    if variable.dtype.kind not in "OUS":
+        return variable
+    words = [str(word) for word in variable.to_numpy().ravel().tolist()]
+    safe = ["'" + word if word[:1] in _FORMULA else word for word in words]
+    return variable.copy(data=np.array(safe, dtype=object).reshape(variable.shape))
+
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def _headers(block: xr.Dataset) -> dict[str, str]:

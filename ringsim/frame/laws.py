@@ -68,8 +68,10 @@ class Row(NDArrayOperatorsMixin):
 
     def __array_function__(self, function: Any, _: Any, given: Any, options: Any) -> Any:
         """What numpy calls for its other functions."""
-        if function is np.zeros_like:
-            return 0.0
+        if function in (np.zeros_like, np.ones_like):
+            return float(function is np.ones_like)
+        if function is np.full_like:
+            return given[1]
         if function is np.clip and not options:
             return np.minimum(np.maximum(given[0], given[1]), given[2])
         return self._notes.do(function, given)

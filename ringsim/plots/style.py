@@ -121,7 +121,16 @@ def new_panels(
 
 def title(figure: Figure, text: str) -> None:
     """A bold title in the upper left corner of the sheet."""
-    figure.suptitle(text, x=0.012, ha="left")
+    figure.suptitle(plain(text), x=0.012, ha="left")
+
+
+def plain(text: str) -> str:
+    r"""Words that users give, with dollars as they are, and not as the ends of a formula.
+
+    >>> plain("between $5 and $6"), plain(r"known \$")
+    ('between \\$5 and \\$6', 'known \\\\$')
+    """
+    return text.replace("$", r"\$")
 
 
 def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> str:

@@ -104,14 +104,25 @@ def known(path: str, others: list[str]) -> list[Found]:
         return found
     every = [one for root in ROOTS for one in paths(root)]
     plain = re.sub(r"\[[^\]]*\]", "", path)
-    ends = [one for one in every if one.endswith(f".{plain}")][:2]
-    near = ends or difflib.get_close_matches(plain, [*others, *every], n=1, cutoff=0.6)
+    ends = list(dict.fromkeys(one for one in every if one.endswith(f".{plain}")))
+    if len(ends) == 1:
+        return find(ends[0])
+    near = ends[:2] or difflib.get_close_matches(plain, [*others, *every], n=1, cutoff=0.6)
+    near = near or _told_of(plain, every)[:3]
     hint = (
         f"did you mean {' or '.join(near)}?" if near else known_or_nearest(plain, [*ROOTS, *others])
     )
     raise InputError(
         f"{path}: no key of a scene or a campaign, and no variable of a result ({hint})"
     )
+
+
+def _told_of(word: str, paths_of_keys: list[str]) -> list[str]:
+    """Paths of the keys whose name or meaning has a word, meanings first."""
+    of = [(path, key) for path in paths_of_keys for key in (each.key for each in find(path))]
+    whole = re.compile(rf"\b{re.escape(word)}\b", re.IGNORECASE)
+    meant = [path for path, key in of if whole.search(key.meaning)]
+    return list(dict.fromkeys([*meant, *(path for path, key in of if word in key.name)]))
 
 
 # Keys in words, as the command line tells them.

@@ -119,6 +119,17 @@ class Scene(Model):
     def _without_names(cls, table: Any) -> Any:
         return numbered(table, points_in(table)) if isinstance(table, dict) else table
 
+    def __repr__(self) -> str:
+        """Name, title and the kinds of its parts in one line; ``ringsim scenes NAME`` has all."""
+        parts = {name: getattr(self, name) for name in type(self).model_fields}
+        kinds = {
+            n: part.model_dump().get("kind") for n, part in parts.items() if isinstance(part, Model)
+        }
+        known = ", ".join(f"{name} {kind}" for name, kind in kinds.items() if kind)
+        return f"Scene({self.name!r}: {self.title or 'no title'}; {known})"
+
+    __str__ = __repr__
+
     def path_of(self, cable: Cable) -> tuple[str, ...]:
         """Names of the points of a cable's path: its winch, pulleys, and end or other winch."""
         return path_of(points_in(self), cable.end)

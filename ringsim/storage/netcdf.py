@@ -200,14 +200,16 @@ _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[bool]:
     """Hold an advisory lock; False if another process holds it, unless it may ``wait``.
 
-    Others may hold a shared lock, too.  OSError if its file is not there and cannot be created.
+    Others may hold a shared lock, too.  OSError if its file is not there and cannot be created, or
+    is a link: what that leads to is none of ours.
     """
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
     except OSError:
-        if not path.exists():
+        if not path.exists() or path.is_symlink():
             raise
-        descriptor = os.open(path, os.O_RDONLY)  # does as well, in folders that are read-only
+        # Does as well, in folders that are read-only.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
     try:
         kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
         held = True  # also on a file system without locks

@@ -87,6 +87,40 @@ def test_a_requirement_of_the_command_line_replaces_the_file_s(study):
     assert " met " in line
 
 
+def test_the_gate_is_closed_until_every_requirement_is_met(study, tmp_path):
+    every = ringsim("analyse", str(study), "--gate", folder=tmp_path)
+    assert every.returncode == 4
+    assert "gate closed: outcome is deployed is not met; deployment_time" in every.stderr
+    words = "probability 0.2, confidence 0.9"  # half deploys
+    wanted = f"outcome: is deployed, {words}", f"deployment_time: max 30 s, {words}"
+    open_ = [word for each in wanted for word in ("--require", each)]
+    assert ringsim("analyse", str(study), "--gate", *open_, folder=tmp_path).returncode == 0
+    # What is not yet shown is not met.
+    unsure = "--require", "outcome: is deployed, probability 0.5, confidence 0.9"
+    late = ringsim("analyse", str(study), "--gate", *open_[2:], *unsure, folder=tmp_path)
+    assert late.returncode == 4
+    assert "outcome is deployed is not yet shown" in late.stderr
+
+
+def test_a_bound_may_have_its_unit_and_no_other(study):
+    found = analyse(
+        study, "--require", "deployment_time: max 12 s, probability 0.5, confidence 0.9"
+    )
+    assert "deployment_time <= 12 s" in found.output
+    for words, told in (
+        ("max 12 ms, probability 0.5, confidence 0.9", "max = 12 ms: give it in s"),
+        ("max 12, probability 0.5 s, confidence 0.9", "0.5 s: give it without a unit"),
+    ):
+        with pytest.raises(InputError, match=told):
+            analyse(study, "--require", f"deployment_time: {words}")
+
+
+def test_a_gate_needs_requirements(tmp_path):
+    campaign(np.arange(20.0)).to_netcdf(tmp_path / "campaign.nc")
+    with pytest.raises(InputError, match="has no requirements to meet: give some"):
+        analyse(tmp_path / "campaign.nc", "--gate")
+
+
 @for_each(
     ("make", "words"),
     [
@@ -103,6 +137,10 @@ def test_a_requirement_of_the_command_line_replaces_the_file_s(study):
         ),
         (lambda folder: folder.write_text("text"), "cannot be read as a netCDF file"),
         (lambda folder: xr.Dataset({"status": 0}).to_netcdf(folder), "holds no samples"),
+        (
+            lambda folder: campaign(np.arange(9.0), status=[77] * 9).to_netcdf(folder),
+            "status holds 77, which means nothing",
+        ),
     ],
 )
 def test_what_is_no_campaign_is_refused(make, words, tmp_path):

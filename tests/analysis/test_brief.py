@@ -38,7 +38,7 @@ def test_an_output_of_chance_alone_is_said_to_be_so():
     noise = np.random.default_rng(3).random(400)
     table = what_matters(analyse(drawn_campaign(RandomDesign(samples=400), lambda _: noise, 3, 4)))
     assert not table.rows
-    assert table.notes[-1] == "no input stands out of chance for asynchrony_max"
+    assert table.notes[-1] == "no input matters more than chance would explain for asynchrony_max"
 
 
 def test_designs_without_intervals_are_judged_by_what_chance_would_reach():
@@ -50,12 +50,37 @@ def test_designs_without_intervals_are_judged_by_what_chance_would_reach():
     assert abs(found.asynchrony_max_rank_correlation.sel(input="x2")) < 1.96 / 31**0.5
     assert found.asynchrony_max_partial_rank_correlation.sel(input="x2") < -0.8
     assert [row[1] for row in table.rows] == ["x1", "x2"]
-    assert "the largest of all 3 would reach" in table.notes[-1]
+    assert "as any of 3 inputs would have by chance" in table.notes[-1]
     late = analyse(drawn_campaign(design, linear, 3, 4, lost=lambda x: x[:, 0] > 0.7))
     assert np.isnan(late.separation_interval).all()
     ((group, name, *_),) = what_separates(late).rows
     assert group.startswith("lost")
     assert name == "x1"
+
+
+def test_a_mean_beside_its_parts_is_told_once():
+    friction = np.random.default_rng(6).random((600, 16))
+    made = drawn_campaign(RandomDesign(samples=600), lambda x: x[:, 0], 1, 1)
+    made["asynchrony_max"] = "sample", friction[:, 4:8].sum(axis=1) + 0.5 * friction[:, 12]
+    made["friction"] = ("sample", "pulley"), friction, {"role": "input", "path": "friction"}
+    every = analyse(made)
+    named = [row[1] for row in what_matters(every).rows]
+    # The mean of all goes with it as well, by those four: 0.51 of its ranks.
+    assert every.asynchrony_max_rank_correlation.sel(input="mean of friction") > 0.4
+    assert named[0] == "pulleys 5 to 8 of friction"
+    assert set(named[1:]) <= {"pulleys 13 to 16 of friction", "friction[13]"}
+    assert len(named) == 2
+
+
+def test_what_rounding_leaves_is_no_result():
+    made = drawn_campaign(RandomDesign(samples=400), linear, 3, 4)
+    rounding = np.random.default_rng(1).normal(size=400)
+    made["peak_tension"] = "sample", 1e-17 * rounding, {"units": "N"}
+    made["deployment_time"] = "sample", 20.0 + 1e-14 * rounding, {"units": "s"}
+    made["peak_latch_rate"] = "sample", 2e-9 + 1e-10 * rounding, {"units": "rad/s"}
+    table = statistics_table(analyse(made))
+    assert [row[0] for row in table.rows] == ["peak_latch_rate", "asynchrony_max"]
+    assert table.notes[0] == "the same in all samples: deployment_time 20 s, peak_tension 0"
 
 
 def test_an_output_has_one_row_with_its_statistics(found):

@@ -229,7 +229,7 @@ def test_errors_stand_side_by_side():
     assert engines == pytest.approx(0.02)
     assert told(found)[-1].split()[-1] == "numerical"
     alone = analyse(campaign(values, asynchrony_max_error=bars))
-    assert "numerical (engines unknown)" in told(alone)[-1]
+    assert "numerical (engines not measured)" in told(alone)[-1]
 
 
 def test_a_campaign_of_which_every_run_failed_is_told():

@@ -15,6 +15,7 @@ from ringsim.campaign.specification import load_campaign
 from ringsim.execution.work import longest_first, relative_cost
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
+from ringsim.tables import size_text
 
 ROOT = Path(__file__).parents[2]
 GOOD = """
@@ -139,6 +140,8 @@ def test_dry_run_tells_the_plan_and_keeps_nothing(bench):
     printed = bench.run("campaign", bench.write(20), "--dry-run", "--out", "out")
     assert "4 to run here" in printed
     assert "from 16 samples that are done" in printed
+    written = sum(file.stat().st_size for file in (bench.folder / "out/journals").iterdir())
+    assert f"{size_text(written / 16)} a sample, {size_text(written / 16 * 20)} for all" in printed
 
 
 def test_dry_run_says_where_there_will_be_no_intervals_and_no_range_of_one(bench):

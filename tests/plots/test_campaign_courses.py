@@ -33,25 +33,22 @@ def deviation(campaign: xr.Dataset) -> np.ndarray:
 
 def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
     figure, wanted = fan(mixed), deviation(mixed)
-    for section, axes in enumerate(figure.axes):
-        middles = [line for line in axes.lines if line.get_label() == "median"]
-        assert len(middles) == 2
-        for plane, line in enumerate(middles):
-            np.testing.assert_allclose(line.get_xdata(), TIMES, atol=1e-12)
-            expected = np.median(wanted[:, plane, section], axis=0)
-            np.testing.assert_allclose(line.get_ydata(), expected, atol=1e-5)
-            every, most = axes.collections[2 * plane : 2 * plane + 2]
-            for band, levels in ((every, (0.0, 1.0)), (most, (0.05, 0.95))):
-                low, high = np.quantile(wanted[:, plane, section], levels, axis=0)
-                drawn_at = band.get_paths()[0].vertices[:, 1]
-                assert drawn_at.min() == pytest.approx(low.min(), abs=1e-5)
-                assert drawn_at.max() == pytest.approx(high.max(), abs=1e-5)
-        worst = [line for line in axes.lines if line.get_label() != "median"]
-        assert [np.abs(w.get_ydata()).max() for w in worst] == pytest.approx(
-            np.abs(lags(6)[:, section]), abs=1e-5
-        )
+    for (plane, section), axes in zip(np.ndindex(2, SECTIONS), figure.axes, strict=True):
+        (line,) = (line for line in axes.lines if line.get_label() == "median")
+        np.testing.assert_allclose(line.get_xdata(), TIMES, atol=1e-12)
+        expected = np.median(wanted[:, plane, section], axis=0)
+        np.testing.assert_allclose(line.get_ydata(), expected, atol=1e-5)
+        every, most = axes.collections
+        for band, levels in ((every, (0.0, 1.0)), (most, (0.05, 0.95))):
+            low, high = np.quantile(wanted[:, plane, section], levels, axis=0)
+            drawn_at = band.get_paths()[0].vertices[:, 1]
+            assert drawn_at.min() == pytest.approx(low.min(), abs=1e-5)
+            assert drawn_at.max() == pytest.approx(high.max(), abs=1e-5)
+        (worst,) = (line for line in axes.lines if line.get_label() != "median")
+        largest = np.abs(worst.get_ydata()).max()
+        assert largest == pytest.approx(np.abs(lags(6)[plane, section]), abs=1e-5)
     assert "worst: sample 6" in legend_of(figure)
-    assert figure.axes[0].get_xlabel().startswith("Time since")
+    assert figure.axes[-1].get_xlabel().startswith("Time since")
     figure.draw_without_rendering()
     box = figure.legends[0].get_window_extent()
     assert 0 <= box.x0 < box.x1 <= figure.bbox.width  # few sections make a narrow figure
@@ -106,24 +103,23 @@ def test_a_record_that_is_lost_lies_on_the_line_between_its_neighbours() -> None
         np.testing.assert_allclose(found.values[place], expected, atol=1e-5)
 
 
-def test_planes_that_are_alike_are_both_seen_and_a_row_has_the_scale_that_it_needs() -> None:
+def test_planes_stand_one_below_the_other_with_one_scale() -> None:
     campaign = made_campaign(5)
     campaign["opening_angle"][:, 1] = campaign["opening_angle"][:, 0]
     figure = fan(campaign)
-    low, high = figure.axes[0].get_ylim()
     angle = campaign["opening_angle"].transpose("sample", "plane", "section", "time").values
     values = angle - angle.mean(axis=(1, 2), keepdims=True)
     air = 0.06 * np.ptp(values)
-    assert (low, high) == pytest.approx((values.min() - air, values.max() + air), rel=1e-4)
-    for axes in figure.axes:
-        upper, lower = (line for line in axes.lines if line.get_label() == "median")
-        np.testing.assert_allclose(upper.get_ydata(), lower.get_ydata(), atol=1e-6)
-        assert upper.get_linestyle() == "-" != lower.get_linestyle()
-        assert upper.get_linewidth() > lower.get_linewidth()
-        assert all(band.get_facecolor()[0, 3] <= 0.2 for band in axes.collections)
-        assert min(line.get_zorder() for line in (upper, lower)) > max(
-            band.get_zorder() for band in axes.collections
-        )
+    wanted = values.min() - air, values.max() + air
+    for section in range(SECTIONS):
+        upper, lower = figure.axes[section], figure.axes[SECTIONS + section]
+        assert upper.get_title(loc="left") == f"section {section + 1}"
+        assert upper.get_position().x0 == lower.get_position().x0
+        lines = [next(a.get_ydata() for a in axes.lines) for axes in (upper, lower)]
+        np.testing.assert_allclose(*lines, atol=1e-6)
+        for axes in (upper, lower):
+            assert axes.get_ylim() == pytest.approx(wanted, rel=1e-4)
+            assert all(band.get_facecolor()[0, 3] <= 0.2 for band in axes.collections)
 
 
 def test_quantiles_do_not_depend_on_how_the_file_is_read(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -274,6 +274,12 @@ def test_every_drawn_variable_is_defined():
     assert {name for picture in PICTURES for name in picture.needs} <= set(VARIABLES)
 
 
+def test_a_title_with_dollars_is_no_formula(deployed):
+    figure = opening_angles(deployed.assign_attrs(title=r"between $\frac{$ and $5"))
+    figure.draw_without_rendering()
+    assert r"between \$\frac{\$ and \$5" in words(figure)
+
+
 def test_importing_the_figures_changes_no_global_setting():
     check = (
         "import sys, matplotlib as mpl; "

@@ -80,6 +80,23 @@ def test_few_plain_samples_have_correlations() -> None:
     assert not explained(made(RandomDesign(samples=5)))
 
 
+def test_what_chance_would_explain_has_no_bar() -> None:
+    campaign = made(RandomDesign(samples=30))
+    tension = 3.0 * campaign["force"].values + 1e-3 * campaign["modulus"].values
+    campaign["peak_tension"] = "sample", tension
+    ((_, bars),) = bars_of(campaign)
+    assert bars.names == ["force"]
+    # Of two inputs, one held, in 30 samples: t of 27 degrees of freedom beyond 1.27 % a side.
+    held = 2.3676
+    assert bars.chance == pytest.approx(held / np.hypot(27**0.5, held), abs=1e-3)
+    campaign["peak_tension"] = "sample", np.random.default_rng(5).random(30)
+    ((_, bars),) = bars_of(campaign)
+    assert not bars.names
+    told = " ".join(each.get_title().get_text() for each in tornado(campaign).legends)
+    told += tornado(campaign).get_supxlabel()
+    assert "more than chance would explain for peak_tension" in " ".join(told.split())
+
+
 def test_a_shut_gate_is_told_with_what_is_known_beside_it() -> None:
     campaign = made(Saltelli(samples=64), lost=0.9)
     figure = tornado(campaign)

@@ -125,6 +125,8 @@ def test_keys_that_scenes_and_campaigns_share_are_told_of_both() -> None:
         ("rods.young_modulos[3]", "did you mean rods.young_modulus?"),
         ("dessign", "did you mean design?"),
         ("asynchronie", "did you mean asynchrony?"),
+        # A word of the meaning: the ring's diameter is no key, but follows from one.
+        ("diameter", "did you mean structure.half_bar or "),
     ],
 )
 def test_a_misspelt_name_is_refused_with_the_nearest(name: str, meant: str) -> None:
@@ -134,6 +136,12 @@ def test_a_misspelt_name_is_refused_with_the_nearest(name: str, meant: str) -> N
     assert len(found.output.splitlines()) == 1
     with pytest.raises(InputError):
         known(name, [])
+
+
+def test_the_end_of_a_path_that_is_the_only_one_is_enough() -> None:
+    found = CliRunner().invoke(cli, ["explain", "half_bar"])
+    assert found.exit_code == 0
+    assert found.output.startswith("structure.half_bar (scene file")
 
 
 def test_paths_are_those_of_files() -> None:

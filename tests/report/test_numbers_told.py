@@ -304,11 +304,15 @@ def separates(file: File, rows: list[dict[str, str]]) -> None:
 
 
 def directed(area: float, inside: int, outside: int, row: dict[str, str]) -> None:
-    """Larger or smaller, with the probability of that."""
-    assert row["it is"] == ("larger" if area >= 0.5 else "smaller")
+    """Larger or smaller, in so many of all pairs, in percent."""
+    word, share = re.fullmatch(
+        r"(\w+) in (\S+) % of pairs", row["beside the others it is"]
+    ).groups()
+    assert word == ("larger" if area >= 0.5 else "smaller")
     area = max(area, 1.0 - area)
-    agrees(row["with probability"], area, digits=2)
-    interval_agrees(row["95 % interval"], area_interval(area, inside, outside), digits=2)
+    agrees(share, 100.0 * area, digits=3)
+    ends = tuple(100.0 * end for end in area_interval(area, inside, outside))
+    interval_agrees(row["95 % interval"], ends, digits=3)
 
 
 def errors(file: File, rows: list[dict[str, str]]) -> None:
@@ -324,7 +328,7 @@ def errors(file: File, rows: list[dict[str, str]]) -> None:
             agrees(most, 0.01 * values.max(), digits=2)
             assert file.values["peak_tension"][int(sample)] == values.max()
             larger = "numerical" if bars > sampling else "sampling"
-            assert row["dominates"] == f"{larger} (engines unknown)"
+            assert row["dominates"] == f"{larger} (engines not measured)"
     assert "peak_tension" in {row["error of the mean of"] for row in rows}
 
 
@@ -408,7 +412,7 @@ def test_the_report_says_what_the_file_holds(told: tuple[File, list[str], str, l
     file, _, text, _ = told
     page = Tables(text)
     texts = [" ".join(each.split()) for each in page.texts]
-    assert any(f"{file.ok.sum()} of {COUNT} have numbers that hold" in each for each in texts)
+    assert any(f"{file.ok.sum()} of {COUNT} samples count" in each for each in texts)
     known = {"model-table", "inputs-table", "failures-table"}
     for name in page.found:
         if name.startswith("worst-table"):

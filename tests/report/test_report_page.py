@@ -372,7 +372,7 @@ def test_the_page_has_all_that_the_analysis_tells_of_main_numbers() -> None:
     assert any(cell.startswith("stalled: ") for cell in cells)
     assert "stalled: the same samples as violates deployment_time" in text
     at = cells.index("peak_tension", cells.index("dominates"))
-    assert cells[at + 6] == "sampling (engines unknown)"
+    assert cells[at + 6] == "sampling (engines not measured)"
     assert "in the fidelity <b>frame</b>" in text
 
 

@@ -33,13 +33,17 @@ UNKNOWN_KEYS = [
     _scene("boom", 'boom = { kind = "rigid", mass = 1.0 }', "boom.mass", "known: ", "length"),
     _scene("other kind's key", 'boom = { kind = "rigid", elements = 4 }', "boom.elements"),
     _scene("net", "net.neutral = 0.7", "net.neutral", "did you mean neutral_length?"),
-    _scene("loads", "loads.forces = 0.015", "loads.force is missing", "loads.forces"),
+    _scene("loads", "loads.forces = 0.015", "loads.forces is not", "did you mean force?"),
+    _scene("Celsius", "temperature.bar.value = -40.0", "at least 1 K; -40 C are 233.15 K"),
     _scene("capital letters", "loads.force = 1.0\nloads.Force = 1.0", "loads.Force", "mean force?"),
     _scene("solver", "solver.time_step = 0.1", "solver.time_step", "did you mean step?"),
     _scene("record", "record.stresses = true", "record.stresses", "did you mean stress?"),
 ]  # fmt: skip
 
 WRONG_TYPES = [
+    _scene("key of many parts", "a." * 300 + "a = 1", "line 2", "a key of more than 100 parts"),
+    _scene("table of many parts", f"[{'a.' * 300}a]", "line 2", "a key of more than 100 parts"),
+    _scene("lists in lists", f"loads = {'[' * 200}{']' * 200}", "nest too deeply"),
     _scene("number in quotes", 'structure.half_bar = "0.2889"', "structure.half_bar", "finite", "m"),
     _scene("fraction of a section", "structure.sections = 6.5", "structure.sections = 6.5", "whole"),
     _scene("whole number as float", "structure.sections = 6.0", "structure.sections", "whole"),

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,20 @@ def test_public_words_are_listed_and_unknown_ones_refused() -> None:
     assert set(ringsim.__all__) <= set(dir(ringsim))
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         _ = ringsim.simulat
+
+
+def test_it_says_its_version_and_what_things_are(tmp_path: Path) -> None:
+    assert ringsim.__version__ == version("ringsim")
+    scene = ringsim.load_scene("ring18-cable")
+    kinds = "structure pantograph-ring, rods geometrically-exact, stop spring-damper"
+    assert repr(scene).startswith(f"Scene('ring18-cable': {scene.title}; {kinds}")
+    assert str(scene) == repr(scene)
+    force = {"kind": "uniform", "low": 0.01, "high": 0.02}
+    campaign = ringsim.Campaign("truss2", {"loads.force": force}, {"kind": "sobol", "samples": 8})
+    assert repr(campaign) == (
+        "Campaign('campaign': scene truss2; design sobol, samples 8, replicates 1; inputs "
+        "loads.force)"
+    )
 
 
 def test_public_words_are_the_things_themselves() -> None:

@@ -114,3 +114,22 @@ def test_a_reader_that_stops_reading_costs_no_result(verb: str, tmp_path: Path) 
         assert process.stderr.read() == ""
     assert process.returncode == 0
     assert out.exists() == (verb == "run")
+
+
+@pytest.mark.parametrize(
+    ("output", "code", "told"),
+    [(">&-", 0, ""), (">/dev/full", 2, "standard output cannot be written: No space left")],
+    ids=["closed", "full"],
+)
+def test_an_output_that_takes_nothing_costs_no_result(
+    output: str, code: int, told: str, tmp_path: Path
+) -> None:
+    words = "run truss2 --fidelity frame --set solver.end_time=0.2 --out run.nc"
+    done = subprocess.run(
+        ["sh", "-c", f"{sys.executable} -m ringsim {words} {output}"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == code, done.stderr
+    assert told in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "run.nc").exists()

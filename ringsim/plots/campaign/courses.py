@@ -2,6 +2,7 @@
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -28,8 +29,8 @@ _WIDEST = 6
     _NEEDS, judged_by, courses,
 )  # fmt: skip
 def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
-    """A panel a section: median, 5-95 % and 0-100 % of its deviation, in each plane; a row of
-    panels has one scale.
+    """A panel a section and plane, one below the other: median, 5-95 % and 0-100 % of its
+    deviation, all with one scale.
 
     ``campaign`` has ``opening_angle`` (sample, plane, section, time).  The sample with the largest
     asynchrony is drawn on its own.  ``read`` is what ``courses`` gives, if it is there already.
@@ -40,33 +41,36 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     looks = dict(zip(planes, _LOOKS, strict=False))
     worst, one = _worst(campaign, read)
     columns = min(_WIDEST, len(sections))
-    rows = -(-len(sections) // columns)
-    figure = Figure(figsize=(max(1.75 * columns, 7.0), max(1.75 * rows, 2.4) + 1.7))
-    grid = figure.subplots(rows, columns, sharex=True, sharey="row", squeeze=False)
-    for number, axes in enumerate(grid.ravel()):
+    blocks = -(-len(sections) // columns)
+    rows = blocks * len(planes)
+    figure = Figure(figsize=(max(1.75 * columns, 7.0), max(1.3 * rows, 2.4) + 2.0))
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    axes: Axes
+    for place, axes in enumerate(grid.ravel()):
+        row, column = divmod(place, columns)
+        number, plane = row // len(planes) * columns + column, planes[row % len(planes)]
         if number >= len(sections):
             axes.set_visible(False)
             continue
-        for plane in planes:
-            own = found.sel(plane=plane, section=sections[number])
-            low, lower, middle, upper, high = own.values
-            colour, dashes, width = looks[plane]
-            for ends, alpha, edge in (((low, high), 0.08, 0.5), ((lower, upper), 0.2, 0.0)):
-                axes.fill_between(own["time"], *ends, facecolor=(colour, alpha), linewidth=edge,
-                                  edgecolor=colour)  # fmt: skip
-            axes.plot(own["time"], middle, color=colour, linewidth=width, linestyle=dashes,
-                      label="median", zorder=4)  # fmt: skip
-            if one is not None:
-                single = one.sel(plane=plane, section=sections[number])
-                axes.plot(single["time"], single, color=style.INK, linewidth=0.8, linestyle=dashes,
-                          zorder=3)  # fmt: skip
-        axes.set_title(f"section {sections[number]}", fontsize=9, pad=3)
-        if number + columns >= len(sections):
+        own = found.sel(plane=plane, section=sections[number])
+        low, lower, middle, upper, high = own.values
+        colour, dashes, width = looks[plane]
+        for ends, alpha, edge in (((low, high), 0.08, 0.5), ((lower, upper), 0.2, 0.0)):
+            axes.fill_between(own["time"], *ends, facecolor=(colour, alpha), linewidth=edge,
+                              edgecolor=colour)  # fmt: skip
+        axes.plot(own["time"], middle, color=colour, linewidth=width, linestyle=dashes,
+                  label="median", zorder=4)  # fmt: skip
+        if one is not None:
+            single = one.sel(plane=plane, section=sections[number])
+            axes.plot(single["time"], single, color=style.INK, linewidth=0.8, linestyle=dashes,
+                      zorder=3)  # fmt: skip
+        if plane == planes[0]:
+            axes.set_title(f"section {sections[number]}", fontsize=9, pad=3)
+        if plane == planes[-1] and number + columns >= len(sections):
             axes.tick_params(labelbottom=True)
             axes.set_xlabel(style.label(found["time"], width=24), fontsize=8)
     drawn = [each for each in (found, one) if each is not None]
-    for row, axes_of in enumerate(grid):
-        axes_of[0].set_ylim(*_limits(drawn, slice(row * columns, (row + 1) * columns)))
+    grid[0, 0].set_ylim(*_limits(drawn))
     grid[0, 0].set_xlim(0.0, float(found["time"][-1]) or 1.0)
     grid[0, 0].xaxis.set_major_locator(MaxNLocator(3))
     figure.supylabel(style.label(found, width=26), fontsize=10)
@@ -83,7 +87,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     if one is not None:
         lines += [Line2D([], [], color=style.INK, linewidth=0.9, label=f"worst: sample {worst}")]
     figure.legend(handles=[*words, *bands, *lines], loc="outside lower center", ncols=3)
-    note = "Runs that are over count on: deployed without deviation, others as they ended."
+    note = "After its end a run that deployed counts as in step, any other as it ended."
     head(figure, campaign, "Ahead and behind", f"{told(campaign, len(read.samples))}. {note}")
     return figure
 
@@ -96,9 +100,9 @@ def _worst(campaign: xr.Dataset, read: Courses) -> tuple[int, xr.DataArray | Non
     return chosen[1], course(campaign, chosen[1], read.bands)
 
 
-def _limits(drawn: list[xr.DataArray], sections: slice) -> tuple[float, float]:
-    """What the curves of these sections need, and some air."""
-    ends = [np.nan_to_num(each.isel(section=sections).values) for each in drawn]
+def _limits(drawn: list[xr.DataArray]) -> tuple[float, float]:
+    """What the curves need, and some air."""
+    ends = [np.nan_to_num(each.values) for each in drawn]
     low, high = min(float(each.min()) for each in ends), max(float(each.max()) for each in ends)
     air = max(0.06 * (high - low), LEAST_SPAN)
     return low - air, high + air

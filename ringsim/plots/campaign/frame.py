@@ -1,6 +1,7 @@
 """Head, caption, names and colours that the figures of a campaign share."""
 
 import itertools
+import re
 import textwrap
 from collections.abc import Sequence
 
@@ -95,15 +96,13 @@ WIDE = 34
 
 def in_lines(name: str) -> str:
     """A name on two lines of bearable length, the path on one of its own; three would overlap."""
+    name = style.plain(name)
     if len(name) <= WIDE:
         return name
-    mean, path = (
-        ("mean of", name.removeprefix("mean of ")) if name.startswith("mean") else ("", name)
-    )
-    path, bracket, place = path.partition("[")
-    if not mean:
-        # Between the parts of a path rather than within a word.
-        apart = textwrap.fill(path.replace(".", ". "), WIDE).replace(". ", ".")
-        return (apart if len(path) > WIDE else path) + ("\n" if bracket else "") + bracket + place
-    part = f" {bracket}{place} of" if bracket else ""
-    return f"{mean}{part}\n{path}"
+    # "mean of PATH", and "sections 5 to 8 of PATH".
+    if whole := re.fullmatch(r"(mean of|\w[\w ]* \d+ to \d+ of) (\S+)", name):
+        return f"{whole[1]}\n{whole[2]}"
+    path, bracket, place = name.partition("[")
+    # Between the parts of a path rather than within a word.
+    apart = textwrap.fill(path.replace(".", ". "), WIDE).replace(". ", ".")
+    return (apart if len(path) > WIDE else path) + ("\n" if bracket else "") + bracket + place

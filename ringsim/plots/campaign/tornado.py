@@ -3,7 +3,7 @@
 import itertools
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +21,11 @@ from ringsim.analysis.design import (
     placement,
     population_of,
     scalars,
+    strongest,
     told,
     values_of,
 )
-from ringsim.analysis.indices import UNLIKELY
+from ringsim.analysis.indices import UNLIKELY, largest_by_chance
 from ringsim.analysis.influence import LEAST, influence
 from ringsim.analysis.intervals import ran
 from ringsim.analysis.requirements import required_by
@@ -33,6 +34,7 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head, in_lines, legend, looks_of
 from ringsim.plots.registry import picture
+from ringsim.stepping.instant import Array
 from ringsim.tables import unit_behind
 
 MEASURES = {
@@ -47,16 +49,20 @@ _COLOURS = {"partial_rank_correlation": style.GREEN, "rank_correlation": style.P
 """Of measures that stand beside indices, which are of another colour."""
 _INSIDE = {"total_index": ("first_order_index", "first-order index")}
 """What a second, thinner bar shows beside it."""
+_BY_CHANCE = "the largest by chance in one case of 20"
 _MOST = 8
 _MOST_PANELS = 9
 _NONE = np.empty(0), np.empty((0, 2)), np.empty(0), np.empty((0, 2))
 
 
 class Bars(NamedTuple):
-    """Bars of one output, the longest first, at most 8; intervals NaN where there are none."""
+    """Bars of one output, the longest first, at most 8; intervals NaN where there are none.
+
+    What chance would explain has no bar, nor what shares places with a longer bar.
+    """
 
     measure: str
-    """A key of ``MEASURES``; empty if there is no bar."""
+    """A key of ``MEASURES``; empty if there is none, and so no bar."""
     names: list[str]
     values: NDArray[np.floating]
     ends: NDArray[np.floating]
@@ -102,6 +108,9 @@ def bars_of(campaign: xr.Dataset) -> Iterator[tuple[str, Bars]]:
     """
     analysis, names = analysed(campaign), scalars(campaign)
     others = analysis["output"].values.tolist() if "output" in analysis.dims else []
+    known = drawn(campaign)
+    each = zip(known.names, known.input, known.span, strict=True)
+    places = {name: (own, *span) for name, own, span in each}
     for output in [*names, *(name for name in others if name not in names)]:
         measure, told = _measure(analysis, output), ""
         if output in others:
@@ -111,7 +120,8 @@ def bars_of(campaign: xr.Dataset) -> Iterator[tuple[str, Bars]]:
                 filter(None, [f"samples: {len(values_of(campaign, output)[0])}", told])
             )
         if measure or told:
-            yield output, _bars(analysis, measure, output, told)
+            chance = _chance(analysis, measure, output, len(values_of(campaign, output)[0]))
+            yield output, _bars(analysis, measure, output, told, chance, places)
 
 
 def _counted(one: xr.Dataset, *, blocks: bool) -> str:
@@ -126,25 +136,44 @@ def _counted(one: xr.Dataset, *, blocks: bool) -> str:
     return f"{of}: {one['index_used'].item()} used, {one['index_lost'].item()} lost"
 
 
-def _bars(analysis: xr.Dataset, measure: str, output: str, told: str) -> Bars:
+def _chance(analysis: xr.Dataset, measure: str, output: str, samples: int) -> Array | None:
+    """What the largest of all inputs reaches by chance in one case of 20; None if not known."""
+    if measure == "given_data_index":
+        found = _values(analysis, "chance_level", output)
+        return None if found is None else found.values
+    if not measure.endswith("rank_correlation"):
+        return None
+    held = analysis["inputs_held"].values * (measure == "partial_rank_correlation")
+    return largest_by_chance(samples, held, analysis.sizes["input"])
+
+
+def _bars(
+    analysis: xr.Dataset, measure: str, output: str, told: str, chance: Array | None,
+    places: Mapping[str, tuple[str, int, int]],
+) -> Bars:  # fmt: skip
     if not measure:
         return Bars("", [], *_NONE, np.nan, told)
     known = _values(analysis, measure, output)
     assert known is not None
     values, (dim,) = known.values, known.dims
-    order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")[:_MOST]
+    order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
     order = order[np.isfinite(values[order])]
+    names = analysis[dim].values.astype(str)
+    if chance is not None:
+        order = order[np.abs(values[order]) > chance[order]]
+        kept = strongest(names[order].tolist(), places)
+        order = order[np.isin(names[order], kept)]
+    order = order[:_MOST]
 
     def of(variable: str, shape: tuple[int, ...]) -> NDArray[np.floating]:
         found = _values(analysis, variable, output)
         return np.full((len(order), *shape), np.nan) if found is None else found.values[order]
 
     second, _ = _INSIDE.get(measure, ("-", ""))
-    level = of("chance_level", ()) if measure == "given_data_index" else np.empty(0)
     return Bars(
-        measure, [str(name) for name in analysis[dim].values[order]], values[order],
+        measure, names[order].tolist(), values[order],
         of(f"{measure}_interval", (2,)), of(second, ()), of(f"{second}_interval", (2,)),
-        float(np.max(level, initial=0.0)) or np.nan, told,
+        np.nan if chance is None or not len(order) else float(np.max(chance[order])), told,
     )  # fmt: skip
 
 
@@ -167,8 +196,11 @@ def tornado(campaign: xr.Dataset) -> Figure:
     # Those that something is required of first: a page has no room for all.
     wanted = required_by(campaign.attrs)
     every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
+    quiet = [name for name, bars in every if bars.measure and not bars.names]
+    every = [each for each in every if each[0] not in quiet]
     found = every[:_MOST_PANELS]
-    found = found or [("", Bars("", [], *_NONE, np.nan, "no measure is known"))]
+    found = found or [("", Bars("", [], *_NONE, np.nan, "nothing beyond chance" if quiet else
+                                "no measure is known"))]  # fmt: skip
     rows = max(len(bars.names) for _, bars in found)
     figure, panels, _ = style.new_panels(len(found), 5.2, 0.9 + 0.34 * rows, 1.1, most=2)
     certain, uncertain = False, False
@@ -181,14 +213,20 @@ def tornado(campaign: xr.Dataset) -> Figure:
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
         unit = f" ({units})" if bars.measure == "mean_absolute_effect" and units != "1" else ""
         below = f"\n{bars.told}" if bars.told and bars.names else ""
-        axes.set_xlabel(f"{MEASURES.get(bars.measure, '')}{unit}{below}", fontsize=9)
+        if bars.names:
+            axes.set_xlabel(f"{MEASURES[bars.measure]}{unit}{below}", fontsize=9)
     if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
         legend(figure, panels)
     whiskers = "Whiskers: intervals of 95 %." if certain else "The design allows no intervals."
     if certain and uncertain:
         whiskers += " Bars without: the interval is not known, as of a perfect correlation."
     most = max((len(values_of(campaign, name)[0]) for name in scalars(campaign)), default=0)
-    caption = f"{told(campaign, most)}. {whiskers} The longest {_MOST} bars at most."
+    caption = (
+        f"{told(campaign, most)}. {whiskers} The longest {_MOST} bars at most, of "
+        "those that chance would not explain."
+    )
+    if quiet:
+        caption += f" No input matters more than chance would explain for {', '.join(quiet)}."
     if others := [name for name, _ in every[_MOST_PANELS:]]:
         caption += f" Not drawn: {', '.join(others)}."
     head(figure, campaign, "What matters", caption)
@@ -201,6 +239,7 @@ def _draw(axes: Axes, bars: Bars) -> None:
         axes.text(0.5, 0.5, bars.told, ha="center", va="center", transform=axes.transAxes,
                   fontsize=9, color=style.VERMILLION)  # fmt: skip
         axes.set_xticks([])
+        axes.set_yticks([])
         return
     measure = bars.measure
     word = MEASURES[measure][0].lower() + MEASURES[measure][1:]
@@ -212,8 +251,9 @@ def _draw(axes: Axes, bars: Bars) -> None:
         _row(axes, height - shift, bars.inside, bars.inside_ends, style.ORANGE,
              _INSIDE[measure][1], 0.34)  # fmt: skip
     if np.isfinite(bars.chance):
-        axes.axvline(bars.chance, color=style.VERMILLION, linestyle="dashed", linewidth=1.2,
-                     label="the largest by chance in one case of 20")  # fmt: skip
+        for side in np.unique(np.sign(bars.values)):
+            axes.axvline(side * bars.chance, color=style.VERMILLION, linestyle="dashed",
+                         linewidth=1.2, label=_BY_CHANCE)  # fmt: skip
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
     axes.locator_params(axis="x", nbins=5)
     axes.set_yticks(height, [in_lines(name) for name in bars.names], fontsize=8)
