@@ -139,7 +139,8 @@ def _save(found: xr.Dataset, out: Path | None) -> None:
     "--analysis", metavar="FILE", type=PATH,
     help="File of ringsim analyse --out with what to show instead of an analysis of today.",
 )  # fmt: skip
-def report_command(folder: Path, out: Path, analysis: Path | None) -> None:
+@click.option("--pdf", is_flag=True, help="Print it, too, with chromium: the same name in .pdf.")
+def report_command(folder: Path, out: Path, analysis: Path | None, pdf: bool) -> None:
     """Write one page about the campaign in DIR, or in a file campaign.nc.
 
     The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
@@ -147,8 +148,16 @@ def report_command(folder: Path, out: Path, analysis: Path | None) -> None:
     require_place(out)
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"--out {out}: the page is HTML: write {out.stem}.html")
+    from ringsim.report.page import require_browser, write_pdf
+
+    if pdf:
+        require_place(out.with_suffix(".pdf"))
+        require_browser()
     with opened(folder) as campaign:
         _write(campaign, folder / MERGED if folder.is_dir() else folder, out, analysis)
+    if pdf:
+        write_pdf(out, out.with_suffix(".pdf"))
+        click.echo(f"wrote {out.with_suffix('.pdf')}")
 
 
 def _write(campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None) -> None:

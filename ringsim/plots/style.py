@@ -345,8 +345,9 @@ _PIXELS = 96.0
 
 
 @styled
-def inline(figure: Figure, name: str, words: str) -> str:
-    """An ``<svg>`` or ``<img>`` element that loads nothing and is described by ``words``.
+def inline(figure: Figure, name: str, words: str, heavy: int = HEAVY) -> str:
+    """An ``<svg>`` or ``<img>`` element that loads nothing and is described by ``words``; lines as
+    long as they take at most ``heavy`` characters.
 
     The same figure gives the same text.  Ids begin with ``name``, since all figures of a page
     share one space of them, and matplotlib numbers them alike in each.
@@ -356,7 +357,7 @@ def inline(figure: Figure, name: str, words: str) -> str:
     with matplotlib.rc_context({"svg.hashsalt": name}):
         figure.savefig(held, format="svg", metadata={"Date": None})
     text = held.getvalue()
-    if len(text) > HEAVY:
+    if len(text) > heavy:
         picture = io.BytesIO()
         figure.savefig(picture, format="png", dpi=_DPI, metadata={"Software": None})
         with Image.open(picture) as drawn:

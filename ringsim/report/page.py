@@ -1,6 +1,10 @@
 """One page about a campaign, out of its merged file."""
 
+import os
 import re
+import shutil
+import subprocess
+import tempfile
 import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,10 +19,10 @@ from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import head_lines, outputs_in, sections
 from ringsim.analysis.worst import NOTE_ON_UNUSUAL
 from ringsim.campaign.specification import flat
-from ringsim.files import write_text
+from ringsim.files import whole, write_text, writing
 from ringsim.plots.figures import figures_of
-from ringsim.plots.style import inline
-from ringsim.refusal import show
+from ringsim.plots.style import HEAVY, inline
+from ringsim.refusal import InputError, show
 from ringsim.report import tables
 from ringsim.report.player import player
 from ringsim.scene import builtin_scenes
@@ -92,6 +96,10 @@ def _comments(text: str) -> dict[str, str]:
 
 LARGEST = 2_000_000
 """Bytes of a page: it is to go by mail."""
+_ANSWERS = ("one_by_one", "rare_event", "distributions", "margin", "fan", "tornado")
+"""Figures that answer what campaigns are run for, in the order in which they are told; the first
+``_FIRST`` of them stand on the first page, all others are evidence."""
+_FIRST = 3
 
 
 def write_report(
@@ -107,10 +115,49 @@ def write_report(
     return len(text.encode("utf-8"))
 
 
+_BROWSERS = "chromium", "chromium-browser", "google-chrome"
+_PRINT_SECONDS = 120.0
+
+
+def require_browser() -> str:
+    """The browser that prints pages; InputError without one."""
+    found = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if found is None:
+        raise InputError(
+            f"--pdf: needs a browser, and none of {', '.join(_BROWSERS)} is installed: install "
+            "chromium, or print the page from your own browser"
+        )
+    return found
+
+
+def write_pdf(file: Path, out: Path) -> None:
+    """Print a page, its folded parts open; InputError if the browser does not."""
+    # Root has no sandbox to give; the page loads nothing.
+    alone = ["--no-sandbox"] * (os.geteuid() == 0)
+    with tempfile.TemporaryDirectory() as own, writing(out):
+        draft = Path(own, "page.pdf")
+        words = [
+            require_browser(), "--headless", "--disable-gpu", *alone, f"--user-data-dir={own}/user",
+            "--no-pdf-header-footer", f"--print-to-pdf={draft}", file.resolve().as_uri(),
+        ]  # fmt: skip
+        try:
+            done = subprocess.run(
+                words, capture_output=True, text=True, timeout=_PRINT_SECONDS, check=False
+            )
+            why = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+        except subprocess.TimeoutExpired:
+            why = [f"no answer within {_PRINT_SECONDS:g} s"]
+        if not draft.exists():
+            raise InputError(f"{out}: the browser has not printed the page: {why[0]}")
+        with whole(out) as place:
+            shutil.copyfile(draft, place)
+
+
 def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) -> str:
     """The page as text: nothing in it refers to another file or address.
 
-    All statistics are those of ``analysis``, what ``analyse`` gives, by default of today.
+    All statistics are those of ``analysis``, what ``analyse`` gives, by default of today.  Figures
+    are drawn as lines as long as the page stays below ``LARGEST`` with them, then as pictures.
     """
     analysis = analyse(campaign) if analysis is None else analysis
     wanted = campaign_file(campaign)
@@ -118,7 +165,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     shown = player(campaign, analysis)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = values_of(campaign)
-    figures = [(p.name, p.words, inline(f, p.name, p.words)) for p, f in figures_of(campaign)]
+    drawn = sorted(figures_of(campaign), key=lambda each: _turn(each[0].name))
     shell = jinja2.Environment(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
@@ -138,7 +185,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
                   if name in campaign},
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign),
-        "figures": figures, "player": shown, "failures": failures, "more": more,
+        "first": _FIRST, "player": shown, "failures": failures, "more": more,
         "worst_note": NOTE_ON_UNUSUAL,
         "players": {str(sample): k for sample, k in places.items()},
         "notes": [*restart_lines(campaign), *override_lines(campaign)],
@@ -146,7 +193,17 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
         "provenance": list(tables.provenance(campaign)),
     }  # fmt: skip
-    return shell.get_template("page.html.j2").render(context)
+    shape, text = shell.get_template("page.html.j2"), ""
+    for heavy in (HEAVY, HEAVY // 4, 0):
+        figures = [(p.name, p.words, inline(f, p.name, p.words, heavy)) for p, f in drawn]
+        text = shape.render(context | {"figures": figures})
+        if len(text.encode("utf-8")) <= LARGEST:
+            break
+    return text
+
+
+def _turn(name: str) -> int:
+    return _ANSWERS.index(name) if name in _ANSWERS else len(_ANSWERS)
 
 
 def _sentence(line: str) -> str:

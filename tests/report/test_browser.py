@@ -9,8 +9,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from made_campaign import made_campaign, with_positions
 
+from ringsim.cli import cli
+from ringsim.dataset import save
 from ringsim.plots import figures
 from ringsim.report.page import page
 from ringsim.shapes import COMPUTED, FROM_ANGLES
@@ -98,3 +101,32 @@ def test_the_page_plays_offline(
     assert not seen["later"].startswith("0.00 s")
     assert not seen["backwards"]  # a frame may have begun before the click
     assert seen["wide"] <= 0  # only tables and figures scroll sideways, within themselves
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
+def test_the_page_is_printed_with_what_it_folds(tmp_path: Path) -> None:
+    save(made_campaign(8), tmp_path / "campaign.nc")
+    out = tmp_path / "made.html"
+    words = ["report", str(tmp_path / "campaign.nc"), "--out", str(out), "--pdf"]
+    done = CliRunner().invoke(cli, words, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    printed = out.with_suffix(".pdf").read_bytes()
+    assert printed.startswith(b"%PDF")
+    # Folded, the page has two sheets: the answer and the failures.
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) >= 4
+    assert sorted(each.name for each in tmp_path.iterdir()) == [
+        "campaign.nc", "made.html", "made.pdf",
+    ]  # fmt: skip
+
+
+def test_without_a_browser_nothing_is_begun(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save(made_campaign(2), tmp_path / "campaign.nc")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    out = tmp_path / "made.html"
+    words = ["report", str(tmp_path / "campaign.nc"), "--out", str(out), "--pdf"]
+    done = CliRunner().invoke(cli, words)
+    assert done.exit_code == 2
+    assert "needs a browser" in done.output
+    assert not out.exists()

@@ -118,7 +118,35 @@ def test_every_figure_and_section_is_there(made: tuple[str, xr.Dataset, str]) ->
     assert ids & figures == ({"figure-by_input"} if kind == "lost" else figures)
     sections = {"outcomes", "figures", "failures", "inputs", "model", "provenance"}
     sections |= set() if kind == "lost" else {"statistics", "errors"}
-    assert sections | {"requirements", "player"} <= ids
+    assert sections | {"requirements", "player", "evidence"} <= ids
+
+
+def test_the_answer_comes_before_failures_and_what_it_is_from(
+    made: tuple[str, xr.Dataset, str],
+) -> None:
+    kind, _, text = made
+    order = ["requirements", "outcomes", "figures", "failures", "player", "evidence"]
+    order += [] if kind == "lost" else ["statistics"]
+    order += ["inputs", "model", "provenance"]
+    places = [text.index(f'<section id="{name}">') for name in order]
+    assert places == sorted(places)
+    # Figures that answer stand before the evidence, three at most; all others within it.
+    figures = [(text.index(f'id="figure-{n}"'), n) for n in re.findall(r'id="figure-(\w+)"', text)]
+    first = [name for at, name in sorted(figures) if at < places[order.index("evidence")]]
+    assert first == [name for _, name in sorted(figures)][:3]
+    answers = [name for name in ("distributions", "fan", "tornado") if f"figure-{name}" in text]
+    assert [name for name in first if name in answers] == answers
+    # What is evidence is folded.
+    assert not re.search(r"<details[^>]* open", text)
+
+
+def test_a_page_that_would_be_too_large_has_pictures_for_lines(monkeypatch) -> None:
+    campaign = made_campaign(8)
+    lines = page(campaign, "runs/made")
+    monkeypatch.setattr(model, "LARGEST", len(lines.encode()) - 1)
+    smaller = page(campaign, "runs/made")
+    assert lines.count("<svg") > smaller.count("<svg")
+    assert lines.count("<figure") == smaller.count("<figure")
 
 
 def test_failures_and_violations_have_their_replay_commands(
@@ -148,7 +176,7 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
         return
     cells = Page(text).cells
     good = campaign["peak_tension"].values[[0, 1, 3, 4, 6]]
-    at = cells.index("peak_tension")
+    at = cells.index("peak_tension", cells.index("std. dev."))
     assert cells[at + 1 : at + 3] == ["N", f"{good.mean():.4g}"]
     row = cells[at : at + len(statistics_table(analyse(campaign)).head)]
     assert {"20", "26", "6", "5 of 7"} <= set(row)
@@ -360,7 +388,7 @@ def test_the_page_has_all_that_the_analysis_tells_of_main_numbers() -> None:
     text, known = page(campaign, "runs/made"), analyse(campaign)
     cells = Page(text).cells
     low, high = known["peak_tension_interval"].sel(statistic="mean").values
-    at = cells.index("peak_tension")
+    at = cells.index("peak_tension", cells.index("std. dev."))
     fine = digits_of(*known["peak_tension"].values[-2:])
     assert cells[at + 2] == number_text(known["peak_tension"].values[0], fine)
     assert cells[at + 3] == interval_text(float(low), float(high), fine)
