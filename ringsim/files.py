@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import secrets
 import tomllib
 from collections.abc import Iterator
@@ -42,6 +43,10 @@ def read_text(path: Path | Traversable) -> str:
 
 _DEEPEST = 100
 """Levels of lists and tables: what a scene or a campaign holds has ten."""
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY = re.compile(
+    rf"^[ \t]*\[{{0,2}}[ \t]*{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_DEEPEST}}}", re.MULTILINE
+)
 
 
 def _depth(found: Any) -> int:
@@ -64,20 +69,15 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     >>> parse_toml("loads.force = 0.02", "ring.toml")
     {'loads': {'force': 0.02}}
     """
-    for number, line in enumerate(text.splitlines(), 1):
-        head, sign, _ = line.partition("=")
-        # Before it is read: a key of a million parts takes a minute.
-        if (
-            head.count(".") > _DEEPEST
-            and (sign or head.lstrip().startswith("["))
-            and "," not in head
-        ):
-            raise InputError(f"{source}: line {number}: a key of more than {_DEEPEST} parts")
+    # Before it is read: a key of a million parts takes a minute.
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.end()) + 1
+        raise InputError(f"{source}: line {line}: a key of more than {_DEEPEST} parts")
     try:
-        found = tomllib.loads(text)
-        if _depth(found) > _DEEPEST:
+        read = tomllib.loads(text)
+        if _depth(read) > _DEEPEST:
             raise RecursionError
-        return found
+        return read
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source}: not valid TOML: {error}; correct that line") from None
     except RecursionError:

@@ -143,7 +143,7 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         return f"{shown}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
     in_unit = f" in{unit}" if unit else ""
     line = says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
-    if unit == " K" and number and value <= 0.0:
+    if unit == " K" and number and -272.15 <= value <= 0.0:
         return f"{line}; {value:g} C are {value + 273.15:g} K"
     if not isinstance(value, str):
         return line

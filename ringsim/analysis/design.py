@@ -23,7 +23,7 @@ from ringsim.sampling.columns import BLOCK_ROW
 from ringsim.sampling.designs.blocks import Grouped, stretches
 from ringsim.sampling.designs.family import Design
 from ringsim.stepping.instant import Array
-from ringsim.variables import GOALS, Fate, Status
+from ringsim.variables import GOALS, Cause, Code, Fate, Status
 
 # The blocks of runs that designs for Sobol' indices and for screening are made of.
 
@@ -417,8 +417,8 @@ def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) 
 
 
 def places_called(variable: xr.DataArray) -> str:
-    """What the places of an input are, as "pulleys"."""
-    return f"{str(variable.dims[1]).replace('_', ' ')}s"
+    """What the places of an input are, as "pulleys": of "pulley_of_two_winches", too."""
+    return f"{str(variable.dims[1]).partition('_')[0]}s"
 
 
 def place_names(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:
@@ -468,7 +468,9 @@ _NOT_RUN = -1
 
 def _require_codes(found: xr.Dataset, file: Path) -> None:
     """Refuse (InputError) statuses and outcomes that there are not."""
-    for name, kind in (("status", Status), ("outcome", Fate)):
+    kinds: dict[str, type[Code]] = {"status": Status, "outcome": Fate, "cause": Cause}
+    kinds |= {f"{name}_checked": kind for name, kind in kinds.items()}
+    for name, kind in kinds.items():
         if name not in found or found[name].dtype.kind not in "iuf":
             continue
         values = found[name].to_numpy().ravel()
@@ -478,8 +480,8 @@ def _require_codes(found: xr.Dataset, file: Path) -> None:
             found.close()
             raise InputError(
                 f"{file}: {name} holds {wrong[0]:g}, which means nothing here (known: "
-                f"{min(known)} .. {max(known)}): the file is damaged, or of another version of "
-                "ringsim: merge again"
+                f"{', '.join(map(str, known))}): the file is damaged, or of another version of "
+                "ringsim: merge the campaign, or run the scene, again"
             )
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from ringsim.analysis import indices
-from ringsim.analysis.design import Drawn, Placement, drawn, endings, short_of_goal
+from ringsim.analysis.design import Drawn, Placement, drawn, endings, short_of_goal, strongest
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
 from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used
 from ringsim.analysis.requirements import Requirement, violations
@@ -221,6 +221,24 @@ def influence(
     if groups:
         coords["group"] = np.array([*groups], dtype=object)
     return xr.Dataset(found, coords=coords)
+
+
+def apart(
+    analysis: xr.Dataset, output: str, names: list[str], places: Mapping[str, tuple[str, int, int]]
+) -> list[str]:
+    """Of columns, the strongest first, those that share no place with a stronger one, in their
+    order.
+
+    Which of two that share places is the stronger their plain rank correlations say, where there
+    are such: a partial one holds other columns for a mean than for its places.
+    """
+    variable = f"{output}_rank_correlation"
+    ordered = names
+    if variable in analysis:
+        plain = analysis[variable].fillna(0.0).to_series().abs()
+        ordered = sorted(names, key=lambda name: -plain.get(name, 0.0))
+    kept = strongest(ordered, places)
+    return [name for name in names if name in kept]
 
 
 def _told(

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from ringsim.analysis import indices
-from ringsim.analysis.design import strongest
 from ringsim.analysis.indices import UNLIKELY
-from ringsim.analysis.influence import confounding_notes, partners
+from ringsim.analysis.influence import apart, confounding_notes, partners
 from ringsim.analysis.intervals import LEVEL, quantities
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
@@ -319,7 +318,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
     for output in [n for n in quantities() if n in told or n in known] + groups:
         found = told[output] if output in told else list(_ranked(analysis, output))
         found, others = _cleared(analysis, output, found)
-        found = _apart(analysis, found)
+        found = _apart(analysis, output, found)
         doubtful += [f"{output} by {name}" for name in others[:_MOST_IN_SHORT]]
         rows += [(output if k == 0 else "", *row) for k, row in enumerate(found[:_MOST_IN_SHORT])]
         if not found:
@@ -330,7 +329,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
         whose = f"any of {count} inputs" if count > 1 else "the input"
         notes.append(
             f"only links as strong as {whose} would have by chance in fewer than one output of 20; "
-            "where a mean and its parts both have one, the stronger"
+            "of a mean and its parts the stronger alone is listed"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
@@ -394,7 +393,9 @@ def _cleared(
     return kept, others
 
 
-def _apart(analysis: xr.Dataset, found: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+def _apart(
+    analysis: xr.Dataset, output: str, found: list[tuple[str, ...]]
+) -> list[tuple[str, ...]]:
     """The rows, the largest first, without those that contain a larger one or lie within it: the
     mean of all pulleys beside that of five of them tells the same twice.
     """
@@ -402,7 +403,7 @@ def _apart(analysis: xr.Dataset, found: list[tuple[str, ...]]) -> list[tuple[str
         return found
     columns = (analysis[name].values.tolist() for name in ("input", "input_of", "input_span"))
     places = {name: (own, *span) for name, own, span in zip(*columns, strict=True)}
-    kept = strongest([row[0] for row in found], places)
+    kept = apart(analysis, output, [row[0] for row in found], places)
     return [row for row in found if row[0] in kept]
 
 

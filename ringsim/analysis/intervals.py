@@ -65,7 +65,9 @@ def all_alike(least: Array | float, most: Array | float) -> Any:
     False
     """
     largest = np.maximum(np.abs(least), np.abs(most))
-    return (np.subtract(most, least) <= _ROUND_OFF * largest) | (largest < NOTHING)
+    with np.errstate(invalid="ignore"):  # of infinite ones
+        near = np.subtract(most, least) <= _ROUND_OFF * largest
+    return np.equal(least, most) | near | (largest < NOTHING)
 
 
 def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:

@@ -168,7 +168,7 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
     return read_requirements(table, "--require")
 
 
-_BOUND = r"(\w+)(?:\s*=\s*|\s+)(\S+)(?:\s+(\S+))?"
+_BOUND = r"(\w+)(?:\s*=\s*|\s+)(\S+)(?:\s+(\S.*))?"
 """A key, its value, and for a bound perhaps its unit."""
 _SHORT = {"deg": "degree"}
 
@@ -177,7 +177,7 @@ def _require_unit(name: str, key: str, value: str, unit: str | None) -> None:
     """Refuse (InputError) a unit behind a bound that is not the output's: nothing is converted."""
     if unit is None or name not in quantities():
         return
-    own = quantities()[name].units
+    own, unit = quantities()[name].units, " ".join(unit.split())
     if key not in ("max", "min") or _SHORT.get(unit, unit) != own:
         cure = f"in {own}" if unit_text(own) else "as a number without a unit"
         cure = cure if key in ("max", "min") else "without a unit"

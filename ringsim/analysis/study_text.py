@@ -227,12 +227,18 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
 
 
 def not_met(analysis: xr.Dataset) -> list[str]:
-    """The requirements that are not met, or not yet shown to be, each with its verdict."""
+    """The requirements that are not met, or not yet shown to be, each with its verdict, and samples
+    that are left; empty if all is done and met.
+    """
     if "requirement" not in analysis.dims:
         return []
+    run, samples = analysis.attrs["samples_run"], analysis.attrs["samples"]
+    # Those that are left may be the slow ones, and the slow ones those that fail.
+    left = [f"{samples - run} of {samples} samples have not run"] if run < samples else []
     codes, texts = (analysis[name].values for name in ("verdict", "requirement_text"))
     each = zip(codes, texts, strict=True)
-    return [f"{text} is {Verdict(code).words}" for code, text in each if code != Verdict.MET]
+    bad = [f"{text} is {Verdict(code).words}" for code, text in each if code != Verdict.MET]
+    return [*bad, *left]
 
 
 def verdict_table(analysis: xr.Dataset) -> Table:

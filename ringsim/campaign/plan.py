@@ -65,12 +65,16 @@ def plan(order: Order, workers: int) -> list[str]:
         numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
         looks = ", ".join(map(str, numbers)) or "none before the last sample"
         lines.append(f"  looks          {looks} (stop_when)")
-    each, told, size = _predicted(order, table, found, todo, lambda sample: sample)
+    judged = survey(order.folder, run_with, checks=True)
+    runs = sum(int(np.isfinite(each.seconds).sum()) for each in (found, judged))
+    each, told, size = _predicted(order, table, found, todo, lambda sample: sample, runs)
     lines += [f"  cost           {words}" for words in told]
     if len(each):
-        whole = f"{size_text(size * table.samples)} for all"
+        every = campaign.specification.check_every
+        every_run = table.samples + (-(-table.samples // every) if every else 0)
+        whole = f"{size_text(size * every_run)} for all"
         lines.append(
-            f"  disk           {size_text(size)} a sample, {whole}, once or twice that for {MERGED}"
+            f"  disk           {size_text(size)} a run, {whole}, once or twice that for {MERGED}"
         )
     most = 0.0
     if isinstance(design, SubsetSimulation) and not design.ended:
@@ -79,14 +83,13 @@ def plan(order: Order, workers: int) -> list[str]:
         most = float(one) * (design.most_runs - done) / workers
     if every := campaign.specification.check_every:
         checked = np.arange(0, table.samples, every)
-        judged = survey(order.folder, run_with, checks=True)
         open_ = np.intersect1d(checked, judged.missing)
         open_ = open_[share.holds(open_)]
         lines.append(
             f"  checks         {len(checked)} samples with the full engine, too, {len(open_)} to "
             "run here"
         )
-        own, told, _ = _predicted(order, table, judged, open_, check_of)
+        own, told, _ = _predicted(order, table, judged, open_, check_of, runs)
         lines += [f"  cost of checks {words}" for words in told]
         each = np.concatenate([each, own])
     if not len(each):
@@ -98,10 +101,15 @@ def plan(order: Order, workers: int) -> list[str]:
 
 
 def _predicted(
-    order: Order, table: Table, found: Survey, todo: Samples, number: Callable[[int], int]
+    order: Order,
+    table: Table,
+    found: Survey,
+    todo: Samples,
+    number: Callable[[int], int],
+    runs: int,
 ) -> tuple[Array, list[str], float]:
     """Time of each run (s), that in words, and bytes that a run takes in the journals; ``number``
-    is that of a sample's run.
+    is that of a sample's run, ``runs`` are those that the journals hold.
     """
     if not len(todo):
         return np.empty(0), [], 0.0
@@ -111,7 +119,7 @@ def _predicted(
         per_cost = float(found.seconds[known].sum() / cost[known].sum())
         basis = f"from {len(known)} samples that are done"
         written = (file.stat().st_size for file in (order.folder / "journals").iterdir())
-        size = sum(written) / len(known)
+        size = sum(written) / runs
     else:
         trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
         kept: list[Result] = []

@@ -132,6 +132,8 @@ class _Told:
 def main() -> None:
     """The command ``ringsim``, see ``ringsim.__main__``."""
     sys.stdout = out = _Told(sys.stdout)
+    if sys.stderr is None:  # closed
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
     try:
         code = cli(standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:

@@ -63,7 +63,7 @@ def write_csv(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
         path = folder / f"{stem}-{'-'.join(dims) or 'numbers'}.csv"
         with whole(path, lasting=False) as draft, draft.open("w", encoding="utf-8") as file:
             for number, block in enumerate(_blocks(dataset[names], dims)):
-                _table(block, dims).to_csv(file, index=False, header=number == 0)
+                _no_formula(_table(block, dims)).to_csv(file, index=False, header=number == 0)
         written.append(path)
     path = folder / f"{stem}-variables.csv"
     about: dict[str, list[str]] = {"units": [], "meaning": [], "dimensions": []}
@@ -109,7 +109,7 @@ def _blocks(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[xr.Dataset]:
 
 def _table(block: xr.Dataset, dims: tuple[str, ...]) -> Any:
     """A pandas table of a block, with units in its headers."""
-    told = block.map(in_words, keep_attrs=True).map(_no_formula, keep_attrs=True)
+    told = block.map(in_words, keep_attrs=True)
     if not dims:
         return told.expand_dims("row").to_dataframe().rename(columns=_headers(block))
     numbers = [n for n, v in told.data_vars.items() if v.dtype.kind == "f"]
@@ -119,16 +119,24 @@ def _table(block: xr.Dataset, dims: tuple[str, ...]) -> Any:
     return table.reset_index().rename(columns=_headers(block))
 
 
-def _no_formula(variable: xr.DataArray) -> xr.DataArray:
-    """Words that spreadsheets would compute have an apostrophe before them, which these hide.
+def _no_formula(table: Any) -> Any:
+    """A pandas table in which words and headers that spreadsheets would compute have an apostrophe
+    before them, which these hide; numbers written as words stay.
 
     Source: OWASP, CSV injection.
     """
-    if variable.dtype.kind not in "OUS":
-        return variable
-    words = [str(word) for word in variable.to_numpy().ravel().tolist()]
-    safe = ["'" + word if word[:1] in _FORMULA else word for word in words]
-    return variable.copy(data=np.array(safe, dtype=object).reshape(variable.shape))
+    words = table.select_dtypes(include=["object", "string"]).columns
+    return table.assign(**{name: table[name].map(_safe) for name in words}).rename(columns=_safe)
+
+
+def _safe(cell: Any) -> Any:
+    if not isinstance(cell, str) or cell[:1] not in _FORMULA or len(cell) < 2:
+        return cell
+    try:
+        float(cell)
+    except ValueError:
+        return f"'{cell}"
+    return cell
 
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")

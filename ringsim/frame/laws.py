@@ -71,7 +71,7 @@ class Row(NDArrayOperatorsMixin):
         if function in (np.zeros_like, np.ones_like):
             return float(function is np.ones_like)
         if function is np.full_like:
-            return given[1]
+            return options["fill_value"] if "fill_value" in options else given[1]
         if function is np.clip and not options:
             return np.minimum(np.maximum(given[0], given[1]), given[2])
         return self._notes.do(function, given)

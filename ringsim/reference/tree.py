@@ -108,7 +108,8 @@ def known(path: str, others: list[str]) -> list[Found]:
     if len(ends) == 1:
         return find(ends[0])
     near = ends[:2] or difflib.get_close_matches(plain, [*others, *every], n=1, cutoff=0.6)
-    near = near or _told_of(plain, every)[:3]
+    # One letter is in every meaning.
+    near = near or (_told_of(plain, every)[:3] if len(plain) > 2 else [])
     hint = (
         f"did you mean {' or '.join(near)}?" if near else known_or_nearest(plain, [*ROOTS, *others])
     )

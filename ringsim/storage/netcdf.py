@@ -200,13 +200,15 @@ _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[bool]:
     """Hold an advisory lock; False if another process holds it, unless it may ``wait``.
 
-    Others may hold a shared lock, too.  OSError if its file is not there and cannot be created, or
-    is a link: what that leads to is none of ours.
+    Others may hold a shared lock, too.  OSError if its file is not there and cannot be created;
+    InputError if it is a link: what that leads to is none of ours.
     """
+    if path.is_symlink():
+        raise InputError(f"{path}: is a link, where a lock of the campaign should be: remove it")
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
     except OSError:
-        if not path.exists() or path.is_symlink():
+        if not path.exists():
             raise
         # Does as well, in folders that are read-only.
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)

@@ -115,6 +115,15 @@ def test_a_bound_may_have_its_unit_and_no_other(study):
             analyse(study, "--require", f"deployment_time: {words}")
 
 
+def test_the_gate_is_closed_while_samples_are_left(tmp_path):
+    """Those that are left may be the slow ones."""
+    status = [0] * 12 + [-1] * 8
+    campaign(np.arange(20.0), status=status).to_netcdf(tmp_path / "campaign.nc")
+    words = "--require", "asynchrony_max: max 100 deg, probability 0.5, confidence 0.5"
+    told = ringsim("analyse", tmp_path / "campaign.nc", "--gate", *words)
+    assert (told.returncode, told.stderr) == (4, "gate closed: 8 of 20 samples have not run\n")
+
+
 def test_a_gate_needs_requirements(tmp_path):
     campaign(np.arange(20.0)).to_netcdf(tmp_path / "campaign.nc")
     with pytest.raises(InputError, match="has no requirements to meet: give some"):

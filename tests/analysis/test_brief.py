@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from made import drawn_campaign
+from ringsim.analysis.influence import apart
 from ringsim.analysis.influence_text import what_matters, what_separates
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import statistics_table, told
@@ -70,6 +72,19 @@ def test_a_mean_beside_its_parts_is_told_once():
     assert named[0] == "pulleys 5 to 8 of friction"
     assert set(named[1:]) <= {"pulleys 13 to 16 of friction", "friction[13]"}
     assert len(named) == 2
+
+
+def test_which_of_a_mean_and_its_places_is_stronger_says_the_plain_correlation():
+    """Partial ones hold other columns for a mean than for its places."""
+    names = ["friction[1]", "mean of friction", "friction[2]", "force"]
+    places = dict(zip(names, [("f", 0, 1), ("f", 0, 9), ("f", 1, 2), ("g", 0, 0)], strict=True))
+    plain = xr.Dataset(
+        {"peak_tension_rank_correlation": ("input", [0.76, -0.8, 0.3, 0.1])}, {"input": names}
+    )
+    assert apart(plain, "peak_tension", names, places) == ["mean of friction", "force"]
+    assert apart(xr.Dataset(), "peak_tension", names, places) == [
+        "friction[1]", "friction[2]", "force",
+    ]  # fmt: skip
 
 
 def test_what_rounding_leaves_is_no_result():

@@ -141,7 +141,7 @@ def test_dry_run_tells_the_plan_and_keeps_nothing(bench):
     assert "4 to run here" in printed
     assert "from 16 samples that are done" in printed
     written = sum(file.stat().st_size for file in (bench.folder / "out/journals").iterdir())
-    assert f"{size_text(written / 16)} a sample, {size_text(written / 16 * 20)} for all" in printed
+    assert f"{size_text(written / 16)} a run, {size_text(written / 16 * 20)} for all" in printed
 
 
 def test_dry_run_says_where_there_will_be_no_intervals_and_no_range_of_one(bench):

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from ringsim.campaign.watch import stopping_on_signals
+from ringsim.refusal import InputError
 from ringsim.storage.netcdf import locked
 
 pytestmark = pytest.mark.quick
@@ -40,9 +41,9 @@ def test_under_nohup_it_goes_on(hang_up) -> None:
 
 def test_a_lock_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "lock").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(OSError, match="lock"), locked(tmp_path / "lock"):
+    with pytest.raises(InputError, match="lock: is a link"), locked(tmp_path / "lock"):
         pass
     assert not (tmp_path / "elsewhere").exists()
     (tmp_path / "elsewhere").touch()
-    with pytest.raises(OSError, match="lock"), locked(tmp_path / "lock"):
+    with pytest.raises(InputError, match="lock: is a link"), locked(tmp_path / "lock"):
         pass

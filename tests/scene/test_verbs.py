@@ -118,7 +118,7 @@ def test_a_reader_that_stops_reading_costs_no_result(verb: str, tmp_path: Path) 
 
 @pytest.mark.parametrize(
     ("output", "code", "told"),
-    [(">&-", 0, ""), (">/dev/full", 2, "standard output cannot be written: No space left")],
+    [(">&- 2>&-", 0, ""), (">/dev/full", 2, "standard output cannot be written: No space left")],
     ids=["closed", "full"],
 )
 def test_an_output_that_takes_nothing_costs_no_result(

@@ -21,12 +21,11 @@ from ringsim.analysis.design import (
     placement,
     population_of,
     scalars,
-    strongest,
     told,
     values_of,
 )
 from ringsim.analysis.indices import UNLIKELY, largest_by_chance
-from ringsim.analysis.influence import LEAST, influence
+from ringsim.analysis.influence import LEAST, apart, influence
 from ringsim.analysis.intervals import ran
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.sensitivity import sensitivity
@@ -161,7 +160,7 @@ def _bars(
     names = analysis[dim].values.astype(str)
     if chance is not None:
         order = order[np.abs(values[order]) > chance[order]]
-        kept = strongest(names[order].tolist(), places)
+        kept = apart(analysis, output, names[order].tolist(), places)
         order = order[np.isin(names[order], kept)]
     order = order[:_MOST]
 
@@ -173,7 +172,7 @@ def _bars(
     return Bars(
         measure, names[order].tolist(), values[order],
         of(f"{measure}_interval", (2,)), of(second, ()), of(f"{second}_interval", (2,)),
-        np.nan if chance is None or not len(order) else float(np.max(chance[order])), told,
+        np.nan if chance is None or not len(order) else float(np.min(chance[order])), told,
     )  # fmt: skip
 
 
@@ -217,14 +216,15 @@ def tornado(campaign: xr.Dataset) -> Figure:
             axes.set_xlabel(f"{MEASURES[bars.measure]}{unit}{below}", fontsize=9)
     if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
         legend(figure, panels)
-    whiskers = "Whiskers: intervals of 95 %." if certain else "The design allows no intervals."
+    whiskers = "Whiskers: intervals of 95 %." if certain else ""
+    if uncertain and not certain:
+        whiskers = "The design allows no intervals."
     if certain and uncertain:
         whiskers += " Bars without: the interval is not known, as of a perfect correlation."
     most = max((len(values_of(campaign, name)[0]) for name in scalars(campaign)), default=0)
-    caption = (
-        f"{told(campaign, most)}. {whiskers} The longest {_MOST} bars at most, of "
-        "those that chance would not explain."
-    )
+    beyond = any(np.isfinite(bars.chance) for _, bars in found)
+    of = f"The longest {_MOST} bars at most{', of those that chance would not explain' * beyond}."
+    caption = " ".join(filter(None, [f"{told(campaign, most)}.", whiskers, of]))
     if quiet:
         caption += f" No input matters more than chance would explain for {', '.join(quiet)}."
     if others := [name for name, _ in every[_MOST_PANELS:]]:
