@@ -328,8 +328,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
         count = analysis.sizes["input"]
         whose = f"any of {count} inputs" if count > 1 else "the input"
         notes.append(
-            f"only links as strong as {whose} would have by chance in fewer than one output of 20; "
-            "of a mean and its parts the stronger alone is listed"
+            f"listed are links so strong that chance alone gives one to {whose} in fewer than one "
+            "output of 20; of a mean and its parts the stronger"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
