@@ -121,6 +121,29 @@ def set_path(table: dict[str, Any], path: str, value: Any) -> None:
         del table[name]
 
 
+def flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
+    """Join nested tables to dotted paths, down to values; with ``whole`` down to tables that have
+    this key, or would need it, since not all that they hold are tables.
+
+    Names of pulleys become paths like others, after the ``default`` of all.
+
+    >>> flat({"coefficient": {"section 6 V": 0.002, "default": 0.001}}, prefix="cables.upper")
+    {'cables.upper.coefficient': 0.001, 'cables.upper.coefficient["section 6 V"]': 0.002}
+    """
+    if not isinstance(table, dict):
+        return {prefix: table} if prefix else table
+    if prefix and whole and not all(isinstance(inner, dict) for inner in table.values()):
+        return {prefix: table} if prefix else table
+    found: dict[str, Any] = {}
+    pulleys = bool(prefix) and place_of(prefix, closed=True) == "pulley"
+    for name, inner in sorted(table.items(), key=lambda item: pulleys and item[0] != "default"):
+        path = f"{prefix}.{name}" if prefix else name
+        if pulleys:
+            path = prefix if name == "default" else f'{prefix}["{name}"]'
+        found |= flat(inner, whole, path)
+    return found
+
+
 def place_of(path: str, *, closed: bool) -> str | None:
     """What a list at ``path`` has one value for: a section, corner or pulley; None if nothing."""
     if path in ("net.stiffness", "offload.residual") and not closed:

@@ -1,6 +1,7 @@
 """What is other in one campaign than in another, or in one run: paired where samples are."""
 
-from collections.abc import Iterator, Mapping
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,13 +28,10 @@ from ringsim.analysis.requirements import (
     violations,
 )
 from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.worst import NOTE, losses, marked
-from ringsim.refusal import InputError
-from ringsim.tables import Table, interval_text, number_text, slim, unit_text
+from ringsim.analysis.worst import NOTE, losses
+from ringsim.overrides import flat
+from ringsim.refusal import InputError, show
 from ringsim.variables import about
-
-# What shares of two campaigns ended how, and kept to what is required: their differences.
-
 
 Both = tuple[xr.Dataset, xr.Dataset]
 Placements = tuple[Placement, Placement]
@@ -162,7 +160,7 @@ def _independent(first: Any, second: Any, replicates: list[Any]) -> intervals.In
     return max(-1.0, float(low)), min(1.0, float(high))
 
 
-# What is other in one campaign than in another, or in one run: paired where samples are.
+# Pairs, and what is told of all outputs.
 
 
 SIDES = ("first", "second")
@@ -179,17 +177,18 @@ class Pairs:
     """By what they are paired, in words, or why there are none."""
 
 
-def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
+def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDES) -> xr.Dataset:
     """Differences of all outputs of two campaigns, or of two runs, second minus first.
 
     Returns for every output NAME that both have ``NAME_mean`` (side), ``NAME_difference``,
     ``NAME_difference_interval`` (bound), ``NAME_samples`` (side) in its unit, and for pairs
     ``NAME_largest_difference`` with ``NAME_largest_difference_sample``; the pairs whose outcome
     differs along ``change``; shares of outcomes along ``kind`` and of samples that keep to a
-    requirement along ``requirement``, see ``differences_of_shares``.  Samples are those that
-    ``analyse`` counts; means and shares are those of populations, and of pairs of grids and lists.
-    ``pairing`` among the attributes says what is paired.  InputError if one holds a run and the
-    other a campaign.
+    requirement along ``requirement``, see ``differences_of_shares``; the scenes' values that differ
+    along ``setting``, by path.  Samples are those that ``analyse`` counts; means and shares are
+    those of populations, and of pairs of grids and lists.  ``pairing`` among the attributes says
+    what is paired; ``names`` are what tables and figures call the two.  InputError if one holds a
+    run and the other a campaign.
     """
     if ("sample" in first.dims) != ("sample" in second.dims):
         raise InputError(
@@ -207,6 +206,7 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
         coords={"side": list(SIDES), "bound": ["lower", "upper"]},
         attrs={
             "first": str(one.attrs.get("title", "")), "second": str(other.attrs.get("title", "")),
+            "first_name": names[0], "second_name": names[1],
             "pairing": pairs.told, "pairs": len(pairs.first),
             "intervals": next(
                 (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
@@ -218,7 +218,31 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
     shares = differences_of_shares((one, other), placed, (pairs.first, pairs.second))
-    return found.assign(_changed((one, other), pairs)).assign(shares)
+    more = _changed((one, other), pairs) | settings((one, other))
+    return found.assign(more).assign(shares)
+
+
+_SCENES_OWN = ("name", "title")
+"""Values of a scene that say nothing of its antenna."""
+
+
+def settings(both: Both) -> dict[str, Any]:
+    """The values in which the scenes differ, as text by path: ``setting_first``, ``_second``.
+
+    A value that one of them lacks is "none".  No rows if a file does not hold its scene.
+    """
+    scenes = [flat(tomllib.loads(str(each.attrs.get("scene", "")))) for each in both]
+    paths = dict.fromkeys(path for scene in scenes for path in scene) if all(scenes) else {}
+    apart = [
+        path for path in paths
+        if path not in _SCENES_OWN and scenes[0].get(path) != scenes[1].get(path)
+    ]  # fmt: skip
+    found: dict[str, Any] = {"setting": ("setting", np.array(apart, dtype=object))}
+    for side, scene in zip(SIDES, scenes, strict=True):
+        told = [show(scene[path]) if path in scene else "none" for path in apart]
+        words = {"long_name": f"value in the scene of the {side}"}
+        found[f"setting_{side}"] = "setting", np.array(told, dtype=object), words
+    return found
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:
@@ -357,111 +381,3 @@ def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any
             {"long_name": f"how the sample of the {side} ended"},
         )  # fmt: skip
     return found
-
-
-# A comparison of two campaigns or runs as lines for people.
-
-
-_NAMED = 20
-"""Changed outcomes that are listed at most."""
-
-
-def compared(found: xr.Dataset) -> list[str]:
-    """All lines: how samples are paired, outcomes, outputs."""
-    pairs = f" ({found.attrs['pairs']} pairs)" if found.attrs["pairs"] > 1 else ""
-    lines = [f"{side}: {found.attrs[side]}" for side in ("first", "second") if found.attrs[side]]
-    lines.append(f"{found.attrs['pairing']}{pairs}")
-    lines += [*filter(None, [found.attrs[NOTE]])]
-    if found.attrs["intervals"]:
-        lines.append(found.attrs["intervals"])
-    for part in (_outcomes, _requirements, _outputs):
-        if more := list(part(found)):
-            lines += ["", *more]
-    return lines
-
-
-def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> list[str]:
-    """Counts of all samples, shares of those compared, and their differences."""
-    rows = []
-    for name in found[dim].values:
-        one = {str(n): v.values for n, v in found.sel({dim: name}).items()}
-        counts = one[f"{word}_compared"].tolist()
-        low, high = one[f"{word}_share_difference_interval"].tolist()
-        rows.append((
-            str(name),
-            *map(str, one[f"{word}_samples"]),
-            *(number_text(share, 3) for share in one[f"{word}_share"]),
-            number_text(one[f"{word}_share_difference"].item(), 3),
-            interval_text(low, high, 3),
-            str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
-        ))  # fmt: skip
-    names = (
-        head, "first", "second", "share in first", "in second", "difference", "95 % interval",
-        "samples",
-    )  # fmt: skip
-    columns = 3 if found.attrs["pairs"] == 1 else len(names)
-    return slim(marked(Table(names[:columns], [row[:columns] for row in rows]), found)).lines()
-
-
-def _requirements(found: xr.Dataset) -> Iterator[str]:
-    if "requirement" in found.dims:
-        yield from _shares(found, "kept", "requirement", "samples that keep to")
-
-
-def _outcomes(found: xr.Dataset) -> Iterator[str]:
-    yield from _shares(found, "kind", "kind", "outcome")
-    changed = found.sizes["change"]
-    if not found.attrs["pairs"]:
-        return
-    yield f"the outcome differs in {changed} of {found.attrs['pairs']}{':' * bool(changed)}"
-    names = ("changed_sample_first", "changed_outcome_first", "changed_outcome_second")
-    for sample, first, second in zip(*(found[name].values for name in names), strict=True):
-        if (changed := changed - 1) == found.sizes["change"] - _NAMED - 1:
-            yield "  ..., all of them in the file of --out"
-            return
-        yield f"  sample {sample}: {first}, then {second}"
-
-
-def _outputs(found: xr.Dataset) -> Iterator[str]:
-    rows = []
-    for name, variable in quantities().items():
-        if f"{name}_difference" not in found:
-            continue
-        first, second = found[f"{name}_mean"].values
-        if np.isnan(first) and not found.attrs["pairs"]:
-            continue
-        apart = found[f"{name}_difference"].item()
-        scale = max(abs(first), abs(second))
-        fine = max(4, int(np.log10(scale / abs(apart))) + 4) if abs(apart) > 0 else 6
-        counts = found[f"{name}_samples"].values.tolist()
-        largest, place = "-", "-"
-        if f"{name}_largest_difference" in found:
-            largest = number_text(found[f"{name}_largest_difference"].item())
-            place = str(found[f"{name}_largest_difference_sample"].item())
-        rows.append((
-            name, unit_text(variable.units), number_text(first, fine),
-            number_text(second, fine), number_text(apart),
-            interval_text(*found[f"{name}_difference_interval"].values.tolist()),
-            _worse(found, name),
-            str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
-            largest, place,
-        ))  # fmt: skip
-    head = (
-        "output", "unit", "first", "second", "difference", "95 % interval", "worse", "samples",
-        "largest of a pair", "in sample",
-    )  # fmt: skip
-    if rows:
-        columns = 7 if found.attrs["pairs"] == 1 else len(head)
-        table = Table(head[:columns], [row[:columns] for row in rows])
-        yield from slim(marked(table, found)).lines()
-
-
-def _worse(found: xr.Dataset, name: str) -> str:
-    """Which side an output is worse on, where the interval of the difference leaves out zero; of
-    two runs by the difference itself.
-    """
-    ends = found[f"{name}_difference_interval"].values
-    if found.attrs["pairs"] == 1:
-        ends = np.full(2, found[f"{name}_difference"].item())
-    ends = np.sort(quantities()[name].badness * ends)
-    return "second" if ends[0] > 0.0 else "first" if ends[1] < 0.0 else "-"

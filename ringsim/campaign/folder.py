@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ringsim import build
 from ringsim.analysis.requirements import to_json
-from ringsim.campaign.specification import SOLVERS, Campaign, flat
+from ringsim.campaign.specification import SOLVERS, Campaign
 from ringsim.files import DRAFT, writing
+from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import Table
 from ringsim.sampling.distributions import plain

@@ -16,7 +16,7 @@ from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
 from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, holds
-from ringsim.overrides import place_of
+from ringsim.overrides import flat
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Correlation, Table
 from ringsim.sampling.designs.family import Design
@@ -31,29 +31,6 @@ SOLVERS = {
     "frame": "ringsim.simulation:run_frame",
 }
 """What maps a scene to its outcome, by fidelity."""
-
-
-def flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
-    """Join nested tables to dotted paths, down to values; with ``whole`` down to tables that have
-    this key, or would need it, since not all that they hold are tables.
-
-    Names of pulleys become paths like others, after the ``default`` of all.
-
-    >>> flat({"coefficient": {"section 6 V": 0.002, "default": 0.001}}, prefix="cables.upper")
-    {'cables.upper.coefficient': 0.001, 'cables.upper.coefficient["section 6 V"]': 0.002}
-    """
-    if not isinstance(table, dict):
-        return {prefix: table} if prefix else table
-    if prefix and whole and not all(isinstance(inner, dict) for inner in table.values()):
-        return {prefix: table} if prefix else table
-    found: dict[str, Any] = {}
-    pulleys = bool(prefix) and place_of(prefix, closed=True) == "pulley"
-    for name, inner in sorted(table.items(), key=lambda item: pulleys and item[0] != "default"):
-        path = f"{prefix}.{name}" if prefix else name
-        if pulleys:
-            path = prefix if name == "default" else f'{prefix}["{name}"]'
-        found |= flat(inner, whole, path)
-    return found
 
 
 def _not_gone(fidelity: Any) -> Any:

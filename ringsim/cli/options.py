@@ -72,7 +72,8 @@ def require_with(option: str, value: object, other: str, given: object) -> None:
     """Refuse (InputError) an option that says nothing without another one."""
     if value is not None and not given:
         told = ",".join(value) if isinstance(value, tuple) else value
-        raise InputError(f"{option} {told}: says nothing without {other}; give both")
+        told = "" if value is True else f" {told}"  # a flag has no value
+        raise InputError(f"{option}{told}: says nothing without {other}; give both")
 
 
 def draw_figures(dataset: "xr.Dataset", folder: Path, name: str, formats: Formats) -> list[Path]:

@@ -145,23 +145,38 @@ def report_command(folder: Path, out: Path, analysis: Path | None, pdf: bool) ->
 
     The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
     """
+    _require_page("--out", out, pdf=pdf)
+    with opened(folder) as campaign:
+        size = _write(campaign, folder / MERGED if folder.is_dir() else folder, out, analysis)
+    _told_page(out, size, pdf=pdf)
+
+
+def _require_page(option: str, out: Path, *, pdf: bool) -> None:
+    """That a page can be written there, and printed; InputError if not."""
     require_place(out)
     if out.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"--out {out}: the page is HTML: write {out.stem}.html")
-    from ringsim.report.page import require_browser, write_pdf
-
+        raise InputError(f"{option} {out}: the page is HTML: write {out.stem}.html")
     if pdf:
+        from ringsim.report.shell import require_browser
+
         require_place(out.with_suffix(".pdf"))
         require_browser()
-    with opened(folder) as campaign:
-        _write(campaign, folder / MERGED if folder.is_dir() else folder, out, analysis)
+
+
+def _told_page(out: Path, size: int, *, pdf: bool) -> None:
+    """Say what was written, and print it if that is wanted."""
+    from ringsim.report.shell import LARGEST, write_pdf
+
+    click.echo(f"wrote {out} ({size / 1e6:.2f} MB)")
+    if size > LARGEST:
+        click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the size it is meant to have")
     if pdf:
         write_pdf(out, out.with_suffix(".pdf"))
         click.echo(f"wrote {out.with_suffix('.pdf')}")
 
 
-def _write(campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None) -> None:
-    from ringsim.report.page import LARGEST, write_report
+def _write(campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None) -> int:
+    from ringsim.report.page import write_report
 
     if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
         raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
@@ -171,10 +186,7 @@ def _write(campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None) -
             f"--analysis {analysis}: holds no analysis: give what ringsim analyse --out has "
             "written, or leave it out"
         )
-    size = write_report(campaign, out, str(file.parent), known)
-    click.echo(f"wrote {out} ({size / 1e6:.2f} MB)")
-    if size > LARGEST:
-        click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the size it is meant to have")
+    return write_report(campaign, out, str(file.parent), known)
 
 
 def _load(file: Path) -> xr.Dataset:
@@ -252,24 +264,45 @@ def _require_sample(dataset: xr.Dataset, sample: int, file: Path) -> None:
 @click.command()
 @click.argument("first", type=PATH)
 @click.argument("second", type=PATH)
+@click.option(
+    "--report", "page", metavar="FILE", type=PATH, help="Write it as one page with figures, too."
+)
+@click.option("--pdf", is_flag=True, help="Print the page, too, with chromium.")
 @click.option("--out", metavar="FILE", type=PATH, help="Write all of it to a netCDF file.")
-def compare_command(first: Path, second: Path, out: Path | None) -> None:
+def compare_command(
+    first: Path, second: Path, page: Path | None, out: Path | None, *, pdf: bool
+) -> None:
     """Say how SECOND differs from FIRST: two campaigns (folders or files), or two runs.
 
     Samples with equal seeds or inputs are compared in pairs, which shows much smaller differences.
     """
-    from ringsim.analysis.comparison import compare, compared
+    from ringsim.analysis.comparison import compare
+    from ringsim.analysis.comparison_text import compared
 
+    require_with("--pdf", pdf or None, "--report", page is not None)
     if out is not None:
         require_file(out)
+    if page is not None:
+        _require_page("--report", page, pdf=pdf)
     with opened(first) as one, opened(second) as other:
+        names = _named(one, first), _named(other, second)
+        names = names if names[0] != names[1] else (str(first), str(second))
         try:
-            found = compare(one, other)
+            found = compare(one, other, names)
         except InputError as error:
             raise InputError(f"{first}, {second}: {error}") from None
-    for line in compared(found):
-        click.echo(line)
-    _save(found, out)
+        for line in compared(found):
+            click.echo(line)
+        _save(found, out)
+        if page is not None:
+            from ringsim.report.comparison import write_comparison
+
+            _told_page(page, write_comparison(found, one, other, page), pdf=pdf)
+
+
+def _named(dataset: xr.Dataset, path: Path) -> str:
+    """What tables call it: the campaign's name, of a run that of its file."""
+    return str(dataset.attrs.get("campaign_name", "")) or path.stem
 
 
 FORMATS = ("csv", "mat", "pvd")

@@ -1,15 +1,10 @@
 """One page about a campaign, out of its merged file."""
 
-import os
 import re
-import shutil
-import subprocess
-import tempfile
 import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jinja2
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import override_lines, peak_lines, restart_lines
@@ -18,13 +13,13 @@ from ringsim.analysis.intervals import good
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import head_lines, outputs_in, sections
 from ringsim.analysis.worst import NOTE_ON_UNUSUAL
-from ringsim.campaign.specification import flat
-from ringsim.files import whole, write_text, writing
+from ringsim.files import write_text
+from ringsim.overrides import flat
 from ringsim.plots.figures import figures_of
-from ringsim.plots.style import HEAVY, inline
-from ringsim.refusal import InputError, show
+from ringsim.refusal import show
 from ringsim.report import tables
 from ringsim.report.player import player
+from ringsim.report.shell import written
 from ringsim.scene import builtin_scenes
 
 # The model of a campaign: every value of its scene, and where it comes from.
@@ -94,8 +89,6 @@ def _comments(text: str) -> dict[str, str]:
     return found
 
 
-LARGEST = 2_000_000
-"""Bytes of a page: it is to go by mail."""
 _ANSWERS = ("one_by_one", "rare_event", "distributions", "margin", "fan", "tornado")
 """Figures that answer what campaigns are run for, in the order in which they are told; the first
 ``_FIRST`` of them stand on the first page, all others are evidence."""
@@ -115,44 +108,6 @@ def write_report(
     return len(text.encode("utf-8"))
 
 
-_BROWSERS = "chromium", "chromium-browser", "google-chrome"
-_PRINT_SECONDS = 120.0
-
-
-def require_browser() -> str:
-    """The browser that prints pages; InputError without one."""
-    found = next(filter(None, map(shutil.which, _BROWSERS)), None)
-    if found is None:
-        raise InputError(
-            f"--pdf: needs a browser, and none of {', '.join(_BROWSERS)} is installed: install "
-            "chromium, or print the page from your own browser"
-        )
-    return found
-
-
-def write_pdf(file: Path, out: Path) -> None:
-    """Print a page, its folded parts open; InputError if the browser does not."""
-    # Root has no sandbox to give; the page loads nothing.
-    alone = ["--no-sandbox"] * (os.geteuid() == 0)
-    with tempfile.TemporaryDirectory() as own, writing(out):
-        draft = Path(own, "page.pdf")
-        words = [
-            require_browser(), "--headless", "--disable-gpu", *alone, f"--user-data-dir={own}/user",
-            "--no-pdf-header-footer", f"--print-to-pdf={draft}", file.resolve().as_uri(),
-        ]  # fmt: skip
-        try:
-            done = subprocess.run(
-                words, capture_output=True, text=True, timeout=_PRINT_SECONDS, check=False
-            )
-            why = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-        except subprocess.TimeoutExpired:
-            why = [f"no answer within {_PRINT_SECONDS:g} s"]
-        if not draft.exists():
-            raise InputError(f"{out}: the browser has not printed the page: {why[0]}")
-        with whole(out) as place:
-            shutil.copyfile(draft, place)
-
-
 def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) -> str:
     """The page as text: nothing in it refers to another file or address.
 
@@ -166,11 +121,6 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = values_of(campaign)
     drawn = sorted(figures_of(campaign), key=lambda each: _turn(each[0].name))
-    shell = jinja2.Environment(
-        loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
-        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    shell.filters["sentence"] = _sentence
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
@@ -193,21 +143,8 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
         "provenance": list(tables.provenance(campaign)),
     }  # fmt: skip
-    shape, text = shell.get_template("page.html.j2"), ""
-    for heavy in (HEAVY, HEAVY // 4, 0):
-        figures = [(p.name, p.words, inline(f, p.name, p.words, heavy)) for p, f in drawn]
-        text = shape.render(context | {"figures": figures})
-        if len(text.encode("utf-8")) <= LARGEST:
-            break
-    return text
+    return written("page.html.j2", context, [(p.name, p.words, f) for p, f in drawn])
 
 
 def _turn(name: str) -> int:
     return _ANSWERS.index(name) if name in _ANSWERS else len(_ANSWERS)
-
-
-def _sentence(line: str) -> str:
-    """A line of a terminal as a sentence: with a capital, unless a name begins it."""
-    first = line.split(maxsplit=1)[0] if line else ""
-    named = not first.isalpha() or first != first.lower()
-    return f"{line if named else line[0].upper() + line[1:]}."

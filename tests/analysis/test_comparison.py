@@ -13,7 +13,8 @@ from scipy.stats import multinomial, ttest_ind
 
 from made import campaign, drawn_campaign, ishigami, response
 from ringsim.analysis import intervals
-from ringsim.analysis.comparison import compare, compared
+from ringsim.analysis.comparison import compare
+from ringsim.analysis.comparison_text import compared
 from ringsim.analysis.design import population_of
 from ringsim.analysis.intervals import difference_of_pairs, difference_of_shares
 from ringsim.cli.results import compare_command
@@ -106,8 +107,8 @@ def test_outcomes_that_changed_are_told_by_sample():
     assert found.changed_sample_first.values.tolist() == [7, 12]
     assert found.changed_outcome_second.values.tolist() == ["stalled", "lost: timeout"]
     lines = compared(found)
-    assert "the outcome differs in 2 of 30:" in lines
-    assert "  sample 12: deployed, then lost: timeout" in lines
+    assert "the outcome differs in 2 of 30" in lines
+    assert ["12", "deployed", "lost:", "timeout"] in [line.split() for line in lines]
     assert found.asynchrony_max_samples.values.tolist() == [29, 29]
     counts = dict(zip(found.kind.values, found.kind_samples.values.tolist(), strict=True))
     assert counts == {"deployed": [30, 28], "lost: timeout": [0, 1], "stalled": [0, 1]}
@@ -226,7 +227,7 @@ def test_two_runs_are_compared(tmp_path):
     assert done.exit_code == 0
     assert xr.load_dataset(arguments[2]).asynchrony_max_difference.item() == 0.5
     line = next(line for line in done.output.splitlines() if line.startswith("asynchrony_max"))
-    assert line.split() == ["asynchrony_max", "degree", "2", "2.5", "0.5", "second"]
+    assert line.split() == ["asynchrony_max", "degree", "2", "2.5", "0.5", "+25", "b"]
 
 
 def test_a_run_and_a_campaign_are_not_compared(tmp_path):

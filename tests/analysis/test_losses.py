@@ -14,7 +14,8 @@ import xarray as xr
 from made_campaign import made_campaign
 
 from made import drawn_campaign
-from ringsim.analysis.comparison import compare, compared
+from ringsim.analysis.comparison import compare
+from ringsim.analysis.comparison_text import compared
 from ringsim.analysis.design import placement
 from ringsim.analysis.requirements import read_requirements, to_json
 from ringsim.analysis.study import analyse

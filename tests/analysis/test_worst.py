@@ -10,7 +10,8 @@ from made_campaign import made_campaign, with_motors
 
 from made import campaign
 from ringsim.analysis.campaign_notes import peak_lines
-from ringsim.analysis.comparison import compare, compared
+from ringsim.analysis.comparison import compare
+from ringsim.analysis.comparison_text import compared
 from ringsim.analysis.design import median_and_worst
 from ringsim.analysis.intervals import quantities, worst_sample
 from ringsim.analysis.requirements import read_requirements

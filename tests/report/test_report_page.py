@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ import xarray as xr
 from click.testing import CliRunner
 from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_positions
 
+from read_page import Page
 from ringsim.analysis.influence_text import sensitivity_tables, what_matters
 from ringsim.analysis.intervals import share_interval
 from ringsim.analysis.study import analyse
@@ -30,55 +30,18 @@ from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.plots import figures as of_campaigns
 from ringsim.plots.ring import lines_at
 from ringsim.report import page as model
-from ringsim.report import tables
-from ringsim.report.page import LARGEST, page
+from ringsim.report import shell, tables
+from ringsim.report.page import page
 from ringsim.report.player import player
+from ringsim.report.shell import LARGEST
 from ringsim.shapes import COMPUTED, FROM_ANGLES
 from ringsim.tables import interval_text, number_text, slim
 
-VOID = {"meta", "br", "img", "input", "link", "hr"}
 KINDS = {
     "mixed": {"failed": (2, 5), "stalled": (4,), "not_run": (7,)},
     "good": {},
     "lost": {"failed": tuple(range(8))},
 }
-
-
-class Page(HTMLParser):
-    """Checks nesting, and collects ids, references and the text of cells."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.ids: list[str] = []
-        self.loads: list[str] = []
-        self.cells: list[str] = []
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in VOID:
-            self.open.append(tag)
-        for name, value in attrs:
-            if name == "id":
-                self.ids.append(str(value))
-            elif name in ("src", "href", "xlink:href", "action", "data", "srcset"):
-                self.loads.append(str(value))
-        if tag in ("td", "th"):
-            self.cells.append("")
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.handle_starttag(tag, attrs)
-        if tag not in VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if {"td", "th"} & set(self.open):
-            self.cells[-1] += data
 
 
 @pytest.fixture
@@ -143,7 +106,7 @@ def test_the_answer_comes_before_failures_and_what_it_is_from(
 def test_a_page_that_would_be_too_large_has_pictures_for_lines(monkeypatch) -> None:
     campaign = made_campaign(8)
     lines = page(campaign, "runs/made")
-    monkeypatch.setattr(model, "LARGEST", len(lines.encode()) - 1)
+    monkeypatch.setattr(shell, "LARGEST", len(lines.encode()) - 1)
     smaller = page(campaign, "runs/made")
     assert lines.count("<svg") > smaller.count("<svg")
     assert lines.count("<figure") == smaller.count("<figure")

@@ -1,0 +1,177 @@
+"""A comparison of two campaigns or runs as tables: for terminals and pages alike."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from ringsim.analysis.intervals import NOTHING, all_alike, quantities
+from ringsim.analysis.study_text import Section, digits_of
+from ringsim.analysis.worst import NOTE, marked
+from ringsim.tables import Table, interval_text, number_text, slim, unit_text, with_unit
+
+_NAMED = 20
+"""Changed outcomes, and values of scenes, that are listed at most."""
+_SHORT = 16
+"""Letters of a name up to which it heads columns."""
+
+
+def compared(found: xr.Dataset) -> list[str]:
+    """All lines: how samples are paired, what differs in the scenes, outcomes, outputs."""
+    lines = head_lines(found)
+    for each in sections(found).values():
+        for table in each.tables:
+            lines += ["", *table.lines()]
+    return lines
+
+
+def head_lines(found: xr.Dataset) -> list[str]:
+    """Which two, how their samples are paired, lost runs that bend it, and missing intervals."""
+    pairs = f" ({found.attrs['pairs']} pairs)" if found.attrs["pairs"] > 1 else ""
+    lines = list[str]()
+    for side, name in zip(("first", "second"), names_of(found), strict=True):
+        title = found.attrs[side]
+        if title or name != side:
+            told = f" ({found.attrs[f'{side}_name']})" if title and name != side else ""
+            lines.append(f"{side}: {title or found.attrs[f'{side}_name']}{told}")
+    lines.append(f"{found.attrs['pairing']}{pairs}")
+    return [*lines, *filter(None, [found.attrs[NOTE], found.attrs["intervals"]])]
+
+
+def names_of(found: xr.Dataset) -> tuple[str, str]:
+    """What the two are called in tables and figures: first and second where names are long."""
+    own = str(found.attrs["first_name"]), str(found.attrs["second_name"])
+    return own if own[0] != own[1] and max(map(len, own)) <= _SHORT else ("first", "second")
+
+
+def sections(found: xr.Dataset) -> dict[str, Section]:
+    """All that a comparison tells, by name, parts without rows and notes left out."""
+    parts = (
+        Section("settings", "What differs in the scenes", [_settings(found)]),
+        Section("outcomes", "Outcomes", [
+            _shares(found, "kind", "kind", "outcome"), _changed(found)
+        ]),
+        Section("requirements", "Requirements", [
+            _shares(found, "kept", "requirement", "samples that keep to")
+        ]),
+        Section("outputs", "Numbers", [_outputs(found)]),
+    )  # fmt: skip
+    return {
+        each.name: each._replace(tables=tables)
+        for each in parts
+        if (tables := [slim(t) for t in each.tables if t.rows or t.notes])
+    }
+
+
+def _settings(found: xr.Dataset) -> Table:
+    """The values in which the two scenes differ."""
+    paths, count = found["setting"].values.tolist(), found.sizes["setting"]
+    columns = (found[f"setting_{side}"].values.tolist() for side in ("first", "second"))
+    rows = [(str(p), str(a), str(b)) for p, a, b in zip(paths, *columns, strict=True)]
+    notes = [f"and {count - _NAMED} more, all of them in the file of --out"] * (count > _NAMED)
+    return Table(("set otherwise in the scene", *names_of(found)), rows[:_NAMED], notes, left=3)
+
+
+def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
+    """Counts of all samples, shares of those compared, and their differences."""
+    rows = []
+    for name in found[dim].values if dim in found.dims else ():
+        one = {str(n): v.values for n, v in found.sel({dim: name}).items()}
+        counts = one[f"{word}_compared"].tolist()
+        low, high = one[f"{word}_share_difference_interval"].tolist()
+        rows.append((
+            str(name),
+            *map(str, one[f"{word}_samples"]),
+            *(number_text(share, 3) for share in one[f"{word}_share"]),
+            number_text(one[f"{word}_share_difference"].item(), 3),
+            interval_text(low, high, 3),
+            str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
+        ))  # fmt: skip
+    first, second = names_of(found)
+    heads = (
+        head, first, second, f"share in {first}", f"in {second}", "difference", "95 % interval",
+        "samples",
+    )  # fmt: skip
+    columns = 3 if found.attrs["pairs"] == 1 else len(heads)
+    return marked(Table(heads[:columns], [row[:columns] for row in rows]), found)
+
+
+def _changed(found: xr.Dataset) -> Table:
+    """The pairs whose outcome is another one."""
+    changed, pairs = found.sizes["change"], found.attrs["pairs"]
+    if not pairs:
+        return Table((), ())
+    if not changed:
+        return Table((), (), ["no outcome differs"])
+    names = ("changed_sample_first", "changed_outcome_first", "changed_outcome_second")
+    listed = zip(*(found[name].values[:_NAMED] for name in names), strict=True)
+    rows = [(str(sample), str(first), str(second)) for sample, first, second in listed]
+    notes = [f"the outcome differs in {changed} of {pairs}"]
+    if changed > _NAMED:
+        notes.append(f"listed are {_NAMED}, all of them are in the file of --out")
+    return Table(("sample", *(f"in {name}" for name in names_of(found))), rows, notes, left=3)
+
+
+def _outputs(found: xr.Dataset) -> Table:
+    """Means of both, their difference with its interval, and the pair that differs most."""
+    rows, alike = [], list[str]()
+    for name, variable in quantities().items():
+        if f"{name}_difference" not in found:
+            continue
+        first, second = found[f"{name}_mean"].values
+        if np.isnan(first) and not found.attrs["pairs"]:
+            continue
+        apart = found[f"{name}_difference"].item()
+        counts = found[f"{name}_samples"].values.tolist()
+        largest, place = "-", "-"
+        if f"{name}_largest_difference" in found:
+            most = found[f"{name}_largest_difference"].item()
+            if all_alike(*sorted((first, second))) and all_alike(*sorted((first, first + most))):
+                value = number_text(first) if abs(first) > NOTHING else "0"
+                alike.append(f"{name} {with_unit(value, variable.units)}")
+                continue
+            largest = number_text(most)
+            place = str(found[f"{name}_largest_difference_sample"].item())
+        fine = digits_of(min(first, second), max(first, second))
+        rows.append((
+            name, unit_text(variable.units), number_text(first, fine), number_text(second, fine),
+            number_text(apart), _percent(first, second) if variable.badness else "-",
+            interval_text(*found[f"{name}_difference_interval"].values.tolist()),
+            _worse(found, name),
+            str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
+            largest, place,
+        ))  # fmt: skip
+    head = (
+        "output", "unit", *names_of(found), "difference", "in %", "95 % interval", "worse in",
+        "samples", "largest of a pair", "in sample",
+    )  # fmt: skip
+    columns = 8 if found.attrs["pairs"] == 1 else len(head)
+    same = "the same in both" if found.attrs["pairs"] == 1 else "the same in each pair"
+    notes = [f"{same}: {', '.join(alike)}"] * bool(alike)
+    return marked(Table(head[:columns], [row[:columns] for row in rows], notes), found)
+
+
+def _percent(first: float, second: float) -> str:
+    """The difference in percent of the first, where both have a sign in common."""
+    if not first * second > NOTHING**2:
+        return "-"
+    return f"{100.0 * (second - first) / abs(first):+.3g}"
+
+
+def _worse(found: xr.Dataset, name: str) -> str:
+    """In which of the two an output is worse, where the interval of the difference leaves out zero;
+    of two runs by the difference itself.
+    """
+    ends = found[f"{name}_difference_interval"].values
+    if found.attrs["pairs"] == 1:
+        ends = np.full(2, found[f"{name}_difference"].item())
+    ends = np.sort(quantities()[name].badness * ends)
+    first, second = names_of(found)
+    return second if ends[0] > 0.0 else first if ends[1] < 0.0 else "-"
+
+
+def differing(found: xr.Dataset) -> Iterator[str]:
+    """The outputs that are not the same in both, those first that an engineer fears to be worse."""
+    table = _outputs(found)
+    names = [row[0] for row in table.rows]
+    yield from sorted(names, key=lambda name: not quantities()[name].badness)

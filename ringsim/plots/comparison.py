@@ -1,0 +1,183 @@
+"""Figures of two campaigns, or two runs, beside each other."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from ringsim.analysis.comparison import paired
+from ringsim.analysis.comparison_text import differing, names_of
+from ringsim.analysis.design import endings, population_of, scalars, values_of
+from ringsim.analysis.intervals import good, numbers, tells_of
+from ringsim.outputs.family import Array
+from ringsim.plots import style
+from ringsim.plots.campaign.frame import legend, limits
+from ringsim.tables import interval_text, number_text, with_unit
+
+_LOOKS = ((style.BLUE, "-"), (style.ORANGE, (0, (5, 1.5))))
+"""Colour and dashes of either: dashes tell them apart in grey."""
+_BANDS = (0.05, 0.5, 0.95)
+_RECORDS = 301
+"""Times of a course at most: more than a figure resolves, and all samples are read at each."""
+_COURSES = {
+    "opening_angle": ("mean", "mean opening angle"),
+    "asynchrony": ("max", ""),
+    "cable_tension": ("max", "largest cable tension"),
+    "rod_stress": ("max", "largest rod stress"),
+    "motor_current": ("max", "largest motor current"),
+}
+"""Courses that are drawn where both have them: what becomes of places, and what that is called."""
+Both = tuple[xr.Dataset, xr.Dataset]
+
+
+def figures_of_both(
+    found: xr.Dataset, first: xr.Dataset, second: xr.Dataset
+) -> Iterator[tuple[str, str, Figure]]:
+    """Name, what it shows in words, and figure, of what ``compare`` has found of two datasets."""
+    both = population_of(first), population_of(second)
+    if "sample" in first.dims:
+        known = [set(scalars(each)) for each in both]
+        names = [n for n in differing(found) if all(n in each for each in known)]
+        if names and found.attrs["pairs"]:
+            words = "How far the samples of each pair differ"
+            yield "differences", words, pairs(found, both, names)
+        if names:
+            yield "values", "Distribution of each main number in both", values(found, both, names)
+    names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
+    names = [n for n in names if all(np.isfinite(_course(e, n)[1]).any() for e in both)]
+    if names:
+        yield "courses", "Courses over time in both", courses(found, both, names)
+
+
+@style.styled
+def pairs(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
+    """A panel a number: second less first of each pair, over the value of the first.
+
+    The line is the mean of the differences, its band the interval; crosses are pairs whose outcome
+    is another one.
+    """
+    matched = paired(*both)
+    figure, panels, _ = style.new_panels(len(names), 3.7, 3.0, 0.9)
+    other = endings(both[0])[matched.first] != endings(both[1])[matched.second]
+    first, second = names_of(found)
+    for axes, name in zip(panels, names, strict=True):
+        one, two = (
+            np.where(good(each), numbers(each, name), np.nan)[k]
+            for each, k in zip(both, (matched.first, matched.second), strict=True)
+        )
+        apart, known = two - one, np.isfinite(two - one)
+        axes.axhline(0.0, color=style.GREY, linewidth=0.9, zorder=1.4)
+        low, high = found[f"{name}_difference_interval"].values.tolist()
+        if np.isfinite(low + high):
+            axes.axhspan(low, high, color=style.SKY, alpha=0.35, linewidth=0.0,
+                         label="mean difference, and its interval of 95 %")  # fmt: skip
+        axes.axhline(found[f"{name}_difference"].item(), color=style.BLUE, linewidth=1.2)
+        for own, marker, colour, word in (
+            (known & ~other, "o", style.BLUE, "pair"),
+            (known & other, "x", style.VERMILLION, "pair whose outcome differs"),
+        ):
+            if own.any():
+                axes.plot(one[own], apart[own], marker, color=colour, markersize=4.5, alpha=0.8,
+                          linestyle="none", label=word, rasterized=own.sum() > 500)  # fmt: skip
+        units = str(both[0][name].attrs.get("units", "1"))
+        axes.set_title(
+            f"mean {with_unit(number_text(found[f'{name}_difference'].item(), 3), units)}"
+            + (f" ({interval_text(low, high, 3)})" if np.isfinite(low + high) else "")
+            + f", n = {int(known.sum())}", fontsize=9,
+        )  # fmt: skip
+        axes.set_xlabel(f"{style.label(both[0][name], width=38)}, {first}", fontsize=9)
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.ticklabel_format(useOffset=False)
+    figure.supylabel(f"Difference: {second} less {first}", fontsize=10.5)
+    legend(figure, panels)
+    style.title(figure, f"Differences of {found.attrs['pairs']} pairs: {second} less {first}")
+    return figure
+
+
+@style.styled
+def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
+    """Share of the samples of either at or below each value; limits that one of them has."""
+    figure, panels, columns = style.new_panels(len(names), 3.7, 3.0, 0.9)
+    for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
+        counts = []
+        for each, called, (colour, dashes) in zip(both, names_of(found), _LOOKS, strict=True):
+            ordered = np.sort(values_of(each, name)[1])
+            of = int(tells_of(each, name).sum())
+            counts.append(f"{len(ordered)} of {of}")
+            share = np.arange(len(ordered) + 1) / of
+            axes.step(np.append(ordered[:1], ordered), share, where="post", color=colour,
+                      linestyle=dashes, label=called)  # fmt: skip
+        wanted = dict.fromkeys(limit for each in both for limit in limits(each, name))
+        for word, limit in wanted:
+            axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (1, 1.5)), linewidth=1.3)
+            axes.annotate(f"{word} {limit:g}", (limit, 1.0), xytext=(0, 2), ha="center",
+                          color=style.VERMILLION, xycoords=axes.get_xaxis_transform(),
+                          textcoords="offset points", fontsize=9)  # fmt: skip
+        axes.set_title(f"n = {', '.join(counts)}", fontsize=9, pad=16.0 if wanted else None)
+        axes.set_ylim(0.0, 1.02)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        style.plain_numbers(axes.xaxis)
+        axes.set_xlabel(style.label(both[0][name], width=38), fontsize=9)
+        if number % columns == 0:
+            axes.set_ylabel("Samples at or below")
+    legend(figure, panels)
+    style.title(figure, "Distributions: {} and {}".format(*names_of(found)))
+    return figure
+
+
+@style.styled
+def courses(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
+    """A panel a quantity over time: of runs their course, of campaigns the median with a band from
+    5 to 95 % of the samples that still run.
+    """
+    single = "sample" not in both[0].dims
+    figure = Figure(figsize=(8.2, 2.3 * len(names) + 1.2))
+    grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, name in zip(grid, names, strict=True):
+        drawn = []
+        for each, called, (colour, dashes) in zip(both, names_of(found), _LOOKS, strict=True):
+            time, rows = _course(each, name)
+            drawn.append(rows)
+            if len(rows) > 1:
+                axes.fill_between(time, rows[0], rows[-1], color=colour, alpha=0.2, linewidth=0.0)
+            axes.plot(time, rows[len(rows) // 2], color=colour, linestyle=dashes, label=called)
+        variable = both[0][name]
+        if _COURSES[name][1]:
+            variable = variable.assign_attrs(long_name=_COURSES[name][1])
+        axes.set_ylabel(style.label(variable, width=26), fontsize=9)
+        if name != "opening_angle":
+            style.span_sizes(axes, np.concatenate([each.ravel() for each in drawn]))
+    grid[-1].set_xlabel(style.label(both[0]["time"]))
+    grid[0].set_xlim(0.0, max(float(_last(each)) for each in both))
+    legend(figure, [*grid])
+    more = "" if single else ", median and 5 to 95 % of the samples that still run"
+    style.title(figure, "Over time: {} and {}".format(*names_of(found)) + more)
+    return figure
+
+
+def _last(dataset: xr.Dataset) -> float:
+    """When the last of the runs was over, s."""
+    return float(np.nanmax(np.append(dataset["final_time"].to_numpy(), 0.0)))
+
+
+def _course(dataset: xr.Dataset, name: str) -> tuple[Array, Array]:
+    """Times and rows of a quantity, (quantile, time): of a run itself, of a campaign ``_BANDS``."""
+    time = dataset["time"].to_numpy()
+    last = int(np.clip(np.searchsorted(time, _last(dataset)), 1, len(time) - 1))
+    at = np.unique(np.linspace(0, last, min(last + 1, _RECORDS)).round().astype(int))
+    values = dataset[name].isel(time=at)
+    if "sample" in dataset.dims:
+        values = values.isel(sample=np.flatnonzero(good(dataset)))
+    places = [dim for dim in values.dims if dim not in ("sample", "time")]
+    if places:
+        values = getattr(values, _COURSES[name][0])(places)
+    if "sample" not in values.dims:
+        return time[at], values.to_numpy()[None]
+    held = values.transpose("sample", "time").to_numpy()
+    rows = np.full((len(_BANDS), len(at)), np.nan)
+    known = np.isfinite(held).any(axis=0)
+    rows[:, known] = np.nanquantile(held[:, known], _BANDS, axis=0)
+    return time[at], rows

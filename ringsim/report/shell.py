@@ -1,0 +1,87 @@
+"""What all pages share: templates, figures as light as a page must be, print."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jinja2
+
+from ringsim.files import whole, writing
+from ringsim.plots.style import HEAVY, inline
+from ringsim.refusal import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LARGEST = 2_000_000
+"""Bytes of a page: it is to go by mail."""
+
+
+def written(
+    template: str, context: Mapping[str, Any], drawn: Sequence[tuple[str, str, "Figure"]]
+) -> str:
+    """The page of a template: ``figures`` in it are name, words and element of each one drawn.
+
+    They are lines as long as the page stays below ``LARGEST`` with them, then pictures.
+    """
+    shell = jinja2.Environment(
+        loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    shell.filters["sentence"] = _sentence
+    shape, text = shell.get_template(template), ""
+    for heavy in (HEAVY, HEAVY // 4, 0):
+        figures = [(name, words, inline(f, name, words, heavy)) for name, words, f in drawn]
+        text = shape.render({**context, "figures": figures})
+        if len(text.encode("utf-8")) <= LARGEST:
+            break
+    return text
+
+
+def _sentence(line: str) -> str:
+    """A line of a terminal as a sentence: with a capital, unless a name begins it."""
+    first = line.split(maxsplit=1)[0] if line else ""
+    named = not first.isalpha() or first != first.lower()
+    return f"{line if named else line[0].upper() + line[1:]}."
+
+
+_BROWSERS = "chromium", "chromium-browser", "google-chrome"
+_PRINT_SECONDS = 120.0
+
+
+def require_browser() -> str:
+    """The browser that prints pages; InputError without one."""
+    found = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if found is None:
+        raise InputError(
+            f"--pdf: needs a browser, and none of {', '.join(_BROWSERS)} is installed: install "
+            "chromium, or print the page from your own browser"
+        )
+    return found
+
+
+def write_pdf(file: Path, out: Path) -> None:
+    """Print a page, its folded parts open; InputError if the browser does not."""
+    # Root has no sandbox to give; the page loads nothing.
+    alone = ["--no-sandbox"] * (os.geteuid() == 0)
+    with tempfile.TemporaryDirectory() as own, writing(out):
+        draft = Path(own, "page.pdf")
+        words = [
+            require_browser(), "--headless", "--disable-gpu", *alone, f"--user-data-dir={own}/user",
+            "--no-pdf-header-footer", f"--print-to-pdf={draft}", file.resolve().as_uri(),
+        ]  # fmt: skip
+        try:
+            done = subprocess.run(
+                words, capture_output=True, text=True, timeout=_PRINT_SECONDS, check=False
+            )
+            why = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+        except subprocess.TimeoutExpired:
+            why = [f"no answer within {_PRINT_SECONDS:g} s"]
+        if not draft.exists():
+            raise InputError(f"{out}: the browser has not printed the page: {why[0]}")
+        with whole(out) as place:
+            shutil.copyfile(draft, place)

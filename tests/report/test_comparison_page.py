@@ -1,0 +1,155 @@
+"""The page of a comparison tells what the comparison found, and its figures draw the samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from made_campaign import made_campaign, made_scene
+
+from read_page import Page
+from ringsim.analysis.comparison import compare
+from ringsim.analysis.comparison_text import compared, names_of, sections
+from ringsim.analysis.intervals import good
+from ringsim.cli import cli
+from ringsim.dataset import save
+from ringsim.plots.comparison import courses, figures_of_both, pairs, values
+from ringsim.report.comparison import page
+from ringsim.report.shell import LARGEST
+
+
+@pytest.fixture(scope="module")
+def both() -> tuple[xr.Dataset, xr.Dataset]:
+    """Campaigns of eight samples each; the second, in a scene of its own, is 10 % less apart."""
+    one, other = made_campaign(8, stalled=(4,)), made_campaign(8, failed=(2,))
+    other["asynchrony_max"] = 0.9 * other["asynchrony_max"]
+    other["asynchrony"] = 0.9 * other["asynchrony"]
+    seeds = "sample", np.arange(8)
+    scene = made_scene().with_values({"rods.young_modulus": 60e9})
+    other.attrs["scene"], other.attrs["title"] = scene.to_toml(), "Soft <rods>"
+    return one.assign(sample_seed=seeds), other.assign(sample_seed=seeds)
+
+
+def test_the_page_holds_every_cell_of_the_terminal_and_loads_nothing(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    found = compare(*both, ("ground", "flight"))
+    text = page(found, *both)
+    read = Page(text)
+    assert len(text.encode()) < LARGEST
+    assert len(read.ids) == len(set(read.ids))
+    assert all(load.startswith(("#", "data:image/png;base64,")) for load in read.loads)
+    cells = [c for s in sections(found).values() for t in s.tables for r in t.rows for c in r]
+    assert sorted(cells) == sorted(c for c in read.cells if c in cells)
+    assert {"figure-differences", "figure-values", "figure-courses"} <= set(read.ids)
+    assert "What differs: Soft &lt;rods&gt; against Made by hand" in text
+    assert text.index('id="requirements"') < text.index('id="figures"') < text.index('id="outputs"')
+
+
+def test_what_differs_in_the_scenes_is_told_by_path(both: tuple[xr.Dataset, xr.Dataset]) -> None:
+    found = compare(*both)
+    assert found["setting"].values.tolist() == ["rods.young_modulus"]
+    given = made_scene().rods.young_modulus
+    assert float(found["setting_first"].item()) == given
+    assert float(found["setting_second"].item()) == 60e9
+    assert found.sel(setting="rods.young_modulus")["setting_second"].item() == "60000000000.0"
+    same = compare(both[0], both[0])
+    assert same.sizes["setting"] == 0
+    lines = "\n".join(compared(same))
+    assert "set otherwise" not in lines
+    assert "no outcome differs" in lines
+    # A part that one of them lacks.
+    held = made_scene().with_values(
+        {"gravity.vector": [0.0, 0.0, -9.81], "offload.planes": "upper"}
+    )
+    found = compare(both[0], both[0].assign_attrs(scene=held.to_toml()))
+    assert found.sel(setting="gravity.vector")["setting_first"].item() == "none"
+    assert "[0.0, 0.0, -9.81]" in "\n".join(compared(found))
+
+
+def test_columns_have_the_names_of_the_two_where_they_are_short(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    found = compare(*both, ("ground", "flight"))
+    assert names_of(found) == ("ground", "flight")
+    (table,) = sections(found)["outputs"].tables
+    assert list(table.head[2:4]) == ["ground", "flight"]
+    (cells,) = (row for row in table.rows if row[0] == "asynchrony_max")
+    row = dict(zip(table.head, cells, strict=True))
+    assert row["in %"] == "-10"
+    assert compared(found)[0].endswith("(ground)")
+    for names in (("a" * 17, "b"), ("same", "same")):
+        assert names_of(compare(*both, names)) == ("first", "second")
+
+
+def test_what_is_the_same_in_each_pair_is_one_line(both: tuple[xr.Dataset, xr.Dataset]) -> None:
+    found = compare(*both)
+    (table,) = sections(found)["outputs"].tables
+    (note,) = table.notes
+    assert note.startswith("the same in each pair: ")
+    assert "asynchrony_max" not in note
+    # Equal means of other samples are not the same.
+    turned = both[0].assign(peak_tension=both[0]["peak_tension"][::-1].variable)
+    names = [row[0] for row in sections(compare(both[0], turned))["outputs"].tables[0].rows]
+    assert "peak_tension" in names
+
+
+def test_figures_draw_the_samples_of_both(both: tuple[xr.Dataset, xr.Dataset]) -> None:
+    found = compare(*both, ("ground", "flight"))
+    held = good(both[0]) & good(both[1])
+    one, two = (each["asynchrony_max"].to_numpy()[held] for each in both)
+    figure = pairs(found, both, ["asynchrony_max"])
+    (axes,) = figure.axes
+    dots = [line for line in axes.lines if line.get_linestyle() == "None"]
+    drawn = np.concatenate([line.get_xydata() for line in dots])
+    order = np.argsort(drawn[:, 0])
+    assert drawn[order] == pytest.approx(np.column_stack([one, two - one])[np.argsort(one)])
+    # The pair that stalled in one of them alone has a mark of its own.
+    assert [len(line.get_xydata()) for line in dots] == [held.sum() - 1, 1]
+    figure = values(found, both, ["asynchrony_max"])
+    first, second = (line for line in figure.axes[0].lines if line.get_drawstyle() == "steps-post")
+    assert first.get_label() == "ground"
+    ordered = np.sort(both[1]["asynchrony_max"].to_numpy()[good(both[1])])
+    assert second.get_xdata()[1:] == pytest.approx(ordered)
+    assert second.get_ydata()[-1] == 1.0
+    figure = courses(found, both, ["asynchrony"])
+    first, second = figure.axes[0].lines
+    for line, each in ((first, both[0]), (second, both[1])):
+        rows = each["asynchrony"].to_numpy()[good(each)]
+        known = np.isfinite(rows).any(axis=0)
+        count = known[: len(line.get_xdata())]
+        middle = np.nanmedian(rows[:, : len(count)][:, count], axis=0)
+        assert line.get_ydata()[count] == pytest.approx(middle)
+
+
+def test_two_runs_are_drawn_over_time(both: tuple[xr.Dataset, xr.Dataset]) -> None:
+    one, other = (each.isel(sample=0, drop=True) for each in both)
+    found = compare(one, other, ("a", "b"))
+    drawn = {name: figure for name, _, figure in figures_of_both(found, one, other)}
+    assert list(drawn) == ["courses"]
+    angles = drawn["courses"].axes[0].lines[0]
+    mean = one["opening_angle"].mean(["plane", "section"]).to_numpy()
+    assert angles.get_ydata() == pytest.approx(mean[: len(angles.get_ydata())], nan_ok=True)
+    assert "figure-courses" in page(found, one, other)
+
+
+def test_the_verb_writes_the_page_and_refuses_what_it_cannot_write(
+    both: tuple[xr.Dataset, xr.Dataset], tmp_path
+) -> None:
+    paths = [str(tmp_path / name) for name in ("a.nc", "b.nc")]
+    for each, path in zip(both, paths, strict=True):
+        save(each, path)
+    out = tmp_path / "page.html"
+    done = CliRunner().invoke(cli, ["compare", *paths, "--report", str(out)])
+    assert done.exit_code == 0, done.output
+    assert f"wrote {out} (" in done.output
+    assert "rods.young_modulus" in out.read_text(encoding="utf-8")
+    for more, told in (
+        (["--report", str(tmp_path / "page.txt")], "the page is HTML: write page.html"),
+        (["--pdf"], "--pdf: says nothing without --report"),
+        (["--report", str(tmp_path / "none" / "page.html")], "none"),
+    ):
+        done = CliRunner().invoke(cli, ["compare", *paths, *more])
+        assert done.exit_code == 2, done.output
+        assert told in done.output
