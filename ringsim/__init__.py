@@ -56,7 +56,7 @@ def __dir__() -> list[str]:
 
 def _register() -> None:
     """Let datasets have ``dataset.ring``."""
-    importlib.import_module(f"{__name__}.analysis")
+    importlib.import_module(f"{__name__}.accessor")
 
 
 if "xarray" in sys.modules:

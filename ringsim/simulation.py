@@ -234,10 +234,16 @@ def simulate(
 ) -> "xr.Dataset":  # fmt: skip
     """Run a scene and return its dataset (see ``ringsim.dataset.to_dataset``).
 
-    ``scene`` is a scene, or what ``load_scene`` reads: the name of a built-in one or a file.
-    ``fidelity`` is "full", which it is if left out, or "frame".  From a stored state ``start``, see
-    :func:`ringsim.read_state`, the run goes on to the end with the engine of that state, and its
-    dataset tells of all from the very beginning.
+    Parameters
+    ----------
+    scene
+        A scene, or what ``load_scene`` reads: the name of a built-in one or a file.
+    fidelity
+        "full", exudyn's multibody model, which it is if left out; or "frame", the same rods, joints
+        and cables several times as fast.
+    start
+        A stored state, see :func:`ringsim.read_state`: the run goes on from there to the end, with
+        the engine of that state, and its dataset tells of all from the very beginning.
 
     InputError if one of them is refused, or if the frame engine cannot represent the scene.
 

@@ -1,6 +1,8 @@
 """Campaigns from Python: the tables of a campaign file as arguments, the same way from there."""
 
+import tomllib
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,9 @@ from ringsim.campaign.stopping import is_behind, merge
 from ringsim.choice import kind_of
 from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED
+from ringsim.overrides import flat
 from ringsim.refusal import InputError
+from ringsim.sampling.distributions import label_of
 from ringsim.scene import Scene
 from ringsim.units import Model
 
@@ -41,10 +45,18 @@ class Campaign:
     ----------
     scene
         A scene, the name of a built-in one, or a scene file.
-    inputs, design, seed, name, keys
-        What a campaign file says under these keys, and any other key that it may have (``set``,
-        ``fidelity``, ``limits``, ``requirements``, ...): tables are dicts.  Paths are relative to
-        the present folder.
+    inputs
+        Distributions by scene path, as tables of a campaign file: ``{"loads.force": {"kind":
+        "uniform", "low": 0.01, "high": 0.02}}``; lengths in m, angles in degree.
+    design
+        How samples are placed: ``{"kind": "sobol", "samples": 64}``.
+    seed
+        Decides all draws: the same seed gives the same samples.
+    name
+        Of the folder that ``run`` writes, by default runs/NAME.
+    keys
+        Any other key of a campaign file (``set``, ``fidelity``, ``limits``, ``requirements``, ...):
+        tables are dicts, paths of files relative to the present folder.
 
     Raises
     ------
@@ -82,12 +94,36 @@ class Campaign:
             f"{kind_of(asked.design)}, {design}; inputs {inputs})"
         )
 
+    def _repr_html_(self) -> str:
+        """The same, then a row an input, and the whole file folded."""
+        described = self._described
+        given = flat(tomllib.loads(described.text).get("inputs", {}), "kind")
+        rows = "".join(
+            f"<tr><td><code>{escape(path)}</code></td><td>{escape(label_of(law))}</td></tr>"
+            for path, law in given.items()
+        )
+        whole = f"<pre>{escape(described.text)}</pre>"
+        return (
+            f"<p>{escape(repr(self))}</p><table>{rows}</table>"
+            f"<details><summary>as a file</summary>{whole}</details>"
+        )
+
     @classmethod
     def read(
         cls, file: str | Path, settings: Mapping[str, Any] | None = None, samples: int | None = None
     ) -> "Campaign":
-        """The campaign of a file, with values by scene path and another number of samples, as
-        ``ringsim campaign FILE --set ... --samples ...`` reads it; InputError if it is refused.
+        """The campaign of a file, as ``ringsim campaign FILE --set ... --samples ...`` reads it.
+
+        Parameters
+        ----------
+        file
+            The campaign file; paths in it are relative to its folder.
+        settings
+            Values by scene path, which come after those of ``[set]``.
+        samples
+            Another number of samples than the file's.
+
+        InputError if it is refused.
         """
         campaign = cls.__new__(cls)
         campaign._described = load_campaign(Path(file), settings, samples)
@@ -108,10 +144,14 @@ class Campaign:
         workers
             Solver processes; None for one, 0 for this very process, which has no limits of time and
             memory.  Under an MPI launcher each rank has one: leave it out.
-        retry_failed, settings
-            Whether failed samples run again, too, and with which solver and record settings.
+        out
+            The folder, runs/NAME if None.  What it holds of the same campaign is kept.
+        retry_failed
+            Whether samples that failed run again, too.
+        settings
+            Solver and record settings, by scene path, of those that run again.
         part
-            "I/N" runs every N-th sample alone.
+            "I/N" runs every N-th sample alone, from the I-th on.
 
         Raises
         ------

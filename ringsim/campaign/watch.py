@@ -1,6 +1,7 @@
 """Watching a campaign: the progress bar, the progress file for others, the stop signals."""
 
 import contextlib
+import importlib.util
 import json
 import os
 import platform
@@ -88,9 +89,10 @@ class Progress:
         self._checked = 0
         self._begin = self._told = time.monotonic()
         notebook = "ipykernel" in sys.modules
-        if notebook:
-            from tqdm.auto import tqdm
-        else:  # tqdm.auto takes 0.1 s to find out where it is
+        # Without its widgets tqdm warns, and shows less than its bar of letters does.
+        if notebook and importlib.util.find_spec("ipywidgets"):
+            from tqdm.notebook import tqdm
+        else:
             from tqdm import tqdm
         self._bar = tqdm(
             total=self.total, initial=self.done, desc=self.name, unit="sample", smoothing=0.1,

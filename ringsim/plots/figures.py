@@ -17,10 +17,19 @@ load_package("ringsim.plots")
 PICTURES = tuple(sorted(known.values(), key=lambda each: (each.of, each.place)))
 
 
-def figures_of(dataset: xr.Dataset) -> Iterator[tuple[Picture, Figure]]:
-    """Every figure for which a run, or the samples of a merged campaign, recorded something."""
+def names_for(dataset: xr.Dataset) -> list[str]:
+    """The names of the figures that ``figures_of`` draws."""
+    return [p.name for p in PICTURES if _recorded(dataset, p) and p.applies(dataset)]
+
+
+def figures_of(dataset: xr.Dataset, name: str | None = None) -> Iterator[tuple[Picture, Figure]]:
+    """Every figure for which a run, or the samples of a merged campaign, recorded something; or the
+    one of that name.
+    """
     read: dict[object, object] = {}
     for each in PICTURES:
+        if name not in (None, each.name):
+            continue
         if not _recorded(dataset, each) or not each.applies(dataset):
             continue
         if each.read is not None and each.read not in read:

@@ -329,6 +329,14 @@ def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
 
 
 @styled
+def as_png(figure: Figure) -> bytes:
+    """A figure as a notebook shows it."""
+    held = io.BytesIO()
+    figure.savefig(held, format="png", dpi=_DPI)
+    return held.getvalue()
+
+
+@styled
 def write(figure: Figure, path: Path) -> None:
     """Write a file of the kind that its name tells: png, svg or pdf."""
     figure.savefig(path)

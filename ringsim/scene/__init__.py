@@ -4,6 +4,7 @@ import copy
 import math
 import os
 from collections.abc import Iterator, Mapping
+from html import escape
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Self, get_origin
@@ -129,6 +130,11 @@ class Scene(Model):
         return f"Scene({self.name!r}: {self.title or 'no title'}; {known})"
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """The same, and all values below it, folded."""
+        every = f"<summary>all values</summary><pre>{escape(self.to_toml())}</pre>"
+        return f"<p>{escape(repr(self))}</p><details>{every}</details>"
 
     def path_of(self, cable: Cable) -> tuple[str, ...]:
         """Names of the points of a cable's path: its winch, pulleys, and end or other winch."""

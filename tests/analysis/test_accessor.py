@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ from scipy.stats import binomtest
 
 import ringsim
 from ringsim.analysis.courses import course, courses
+from ringsim.plots.figures import names_for
 from ringsim.refusal import InputError
 
 
@@ -34,7 +36,7 @@ def campaign() -> xr.Dataset:
     "order",
     [
         "import ringsim, xarray; ringsim.InputError", "import xarray, ringsim",
-        "import ringsim.analysis.accessor, xarray, ringsim",
+        "import ringsim.accessor, xarray, ringsim",
     ],
 )  # fmt: skip
 def test_every_dataset_has_it(order: str) -> None:
@@ -109,3 +111,26 @@ def test_what_was_left_out_is_refused(campaign: xr.Dataset) -> None:
     with pytest.raises(InputError, match="opening_angle, which this dataset"):
         xr.Dataset().ring.leader()
     assert "Campaign" in dir(ringsim)
+
+
+def test_figures_are_methods_and_notebooks_show_them(campaign: xr.Dataset) -> None:
+    figure = campaign.ring.plot("lock_order")
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert pickle.loads(pickle.dumps(figure))._repr_png_()
+    every = campaign.ring.plot()
+    assert list(every) == names_for(campaign)
+    assert repr(every).startswith("figures: distributions, ")
+    assert every._repr_html_().count("<p>") == len(every)
+    run = campaign.isel(sample=0, drop=True)
+    assert "opening_angles" in run.ring.plot()
+    with pytest.raises(InputError, match=r"no such figure \(did you mean lock_order"):
+        campaign.ring.plot("lock_orders")
+    with pytest.raises(InputError, match="no such figure"):
+        campaign.drop_vars("lock_time").ring.plot("lock_order")
+
+
+def test_notebooks_show_what_a_dataset_can_be_asked(campaign: xr.Dataset) -> None:
+    text = campaign.ring._repr_html_()
+    assert text.startswith("<p>ring of a campaign</p>")
+    assert text.count("<tr>") == repr(campaign.ring).count("()")
+    assert "Which V-joint is most open and which least." in text

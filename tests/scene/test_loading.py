@@ -76,6 +76,9 @@ def test_it_says_its_version_and_what_things_are(tmp_path: Path) -> None:
         "Campaign('campaign': scene truss2; design sobol, samples 8, replicates 1; inputs "
         "loads.force)"
     )
+    shown = campaign._repr_html_()
+    assert "<code>loads.force</code></td><td>uniform(high=0.02, low=0.01)</td>" in shown
+    assert "&lt;b&gt;" in scene.model_copy(update={"title": "<b>"})._repr_html_()
 
 
 def test_public_words_are_the_things_themselves() -> None:

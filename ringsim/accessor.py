@@ -1,16 +1,33 @@
 """What every dataset of ringsim can be asked as ``dataset.ring``.
 
 It is there once a public word of ringsim has been used, or ringsim was imported after xarray; else
-``import ringsim.analysis``.
+``import ringsim.accessor``.
 """
 
+import functools
+import html
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import xarray as xr
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
+
+
+class Figures(dict[str, "Figure"]):
+    """Figures by name; a notebook shows them below each other."""
+
+    def __repr__(self) -> str:
+        """Their names, and what to do with one."""
+        return f'figures: {", ".join(self)}: figures["NAME"].savefig("NAME.png")'
+
+    def _repr_html_(self) -> str:
+        from ringsim.plots.style import inline
+
+        drawn = (f"<p>{name}</p>{inline(figure, name, name)}" for name, figure in self.items())
+        return f'<div style="background: white">{"".join(drawn)}</div>'
 
 
 @xr.register_dataset_accessor("ring")  # type: ignore[no-untyped-call]
@@ -28,6 +45,40 @@ class Ring:
         kind = "campaign" if "sample" in self._dataset.dims else "run"
         asked = [f"{n}()" for n, word in vars(Ring).items() if n[0] != "_" and callable(word)]
         return f"ring of a {kind}: ask {', '.join(asked)}"
+
+    def _repr_html_(self) -> str:
+        """The same with what each question is answered by."""
+        rows = [
+            f"<tr><td><code>.ring.{name}()</code></td>"
+            f"<td>{html.escape((word.__doc__ or '').split(chr(10))[0])}</td></tr>"
+            for name, word in vars(Ring).items()
+            if name[0] != "_" and callable(word)
+        ]
+        return f"<p>{html.escape(repr(self).split(':')[0])}</p><table>{''.join(rows)}</table>"
+
+    @overload
+    def plot(self, name: str) -> "Figure": ...
+    @overload
+    def plot(self, name: None = None) -> Figures: ...
+    def plot(self, name: str | None = None) -> "Figure | Figures":
+        """The figure of that name, or all that apply, by name; as ``ringsim plot`` writes them.
+
+        They are matplotlib's: ``savefig`` writes one, and a notebook shows it.
+
+        InputError if there is no such figure, or its numbers are not recorded.
+        """
+        from ringsim.plots import figures, style
+        from ringsim.refusal import InputError, known_or_nearest
+
+        if name is not None and name not in (known := figures.names_for(self._dataset)):
+            hint = known_or_nearest(name, known)
+            raise InputError(f"plot({name!r}): this dataset has no such figure ({hint})")
+        drawn = Figures()
+        for each, figure in figures.figures_of(self._dataset, name):
+            # A notebook shows it so also where pyplot has not told it how.
+            vars(figure)["_repr_png_"] = functools.partial(style.as_png, figure)
+            drawn[each.name] = figure
+        return drawn if name is None else drawn[name]
 
     def leader(self) -> xr.Dataset:
         """Which V-joint is most open and which least.
