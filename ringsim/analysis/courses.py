@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ringsim.analysis.design import blocks
 from ringsim.analysis.intervals import Mask, good
 from ringsim.outputs.family import Array
+from ringsim.variables import Fate
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 """What bands show: all samples, nine in ten, the median."""
@@ -44,11 +45,19 @@ class Courses:
         return self.bands.sel(quantile=0.5)
 
 
+def deployed(campaign: xr.Dataset) -> Mask:
+    """Which rings came to 180 deg and stay there, as no latch missed its catch, (sample,)."""
+    open_once = np.asarray(np.isfinite(campaign["deployment_time"].to_numpy()))
+    if "outcome" not in campaign:
+        return open_once
+    missed = campaign["outcome"].to_numpy() == int(Fate.NOT_LATCHED)
+    return np.asarray(open_once & ~missed)
+
+
 def ends(campaign: xr.Dataset) -> Array:
-    """When each run was over: its last lock, or its end if there was none; s, (sample,)."""
+    """When each run was over: its last lock where the ring stays open, or its end; s, (sample,)."""
     final, time = campaign["final_time"].to_numpy(), campaign["time"].to_numpy()
-    deployed = campaign["deployment_time"].to_numpy()
-    found = np.where(np.isfinite(deployed), deployed, final)
+    found = np.where(deployed(campaign), campaign["deployment_time"].to_numpy(), final)
     return np.asarray(np.where(np.isfinite(found), found, time[-1]), dtype=float)
 
 
@@ -116,7 +125,8 @@ def _rows(campaign: xr.Dataset, at: Places) -> Iterator[tuple[Numbers, Places]]:
     and which samples they are.
     """
     time = campaign["time"].to_numpy()
-    for block in blocks(campaign, [_ANGLE, "status", "deployment_time"]):
+    names = [_ANGLE, "status", "deployment_time", *(n for n in ["outcome"] if n in campaign)]
+    for block in blocks(campaign, names):
         block = block.isel(sample=np.flatnonzero(good(block)))
         angles = block[_ANGLE].transpose("sample", "plane", "section", "time").to_numpy()
         known = np.isfinite(angles).all(axis=(1, 2))
@@ -124,10 +134,10 @@ def _rows(campaign: xr.Dataset, at: Places) -> Iterator[tuple[Numbers, Places]]:
         angles, known = angles[recorded], known[recorded]
         rows = _laid(angles, time, known, at)
         rows -= rows.mean(axis=(1, 2), keepdims=True)
-        deployed = np.isfinite(block["deployment_time"].to_numpy()[recorded])
+        over = deployed(block)[recorded]
         last = known.shape[1] - 1 - known[:, ::-1].argmax(axis=1)
         # The last record may be before the last lock, when joints are still apart.
-        locked = deployed[:, None] & (at > last[:, None])
+        locked = over[:, None] & (at > last[:, None])
         rows = np.where(locked[:, None, None, :], 0.0, rows)
         yield rows.astype("f4"), block["sample"].to_numpy()[recorded]
 

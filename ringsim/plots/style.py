@@ -315,6 +315,25 @@ def signed_sizes(axes: Axes, sizes: np.ndarray) -> None:
         )
 
 
+_MOST_MARGIN = 1e3
+
+
+def margin_axis(axes: Axes, margins: np.ndarray) -> None:
+    """Value axis of margins, linear up to 1 and logarithmic from there on.
+
+    Where little resists, margins are a hundred times what they are where it counts.
+    """
+    known = margins[np.isfinite(margins)]
+    least, most = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    most = min(most, _MOST_MARGIN)
+    axes.set_yscale("symlog", linthresh=1.0, linscale=1.0)
+    axes.set_ylim(min(-0.1, least - 0.1), 1.3 * max(most, 1.0))
+    powers = (10.0**k for k in range(4) if 10.0**k < 1.3 * most)
+    below = (-0.5 * k for k in range(1, int(max(0.0, -2.0 * least)) + 1))
+    axes.set_yticks(sorted({0.0, 0.5, 1.0, 2.0, 5.0, *powers, *below}))
+    plain_numbers(axes.yaxis)
+
+
 def plain_numbers(axis: Axis) -> None:
     """Ticks with all of their number, no power of ten beside the axis, and only the major ones."""
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

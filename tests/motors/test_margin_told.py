@@ -13,7 +13,7 @@ from motor_rings import ring
 from ringsim.cli import cli
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.plots import figures
-from ringsim.plots.rods_and_cables import drive
+from ringsim.plots.drives_and_locks import drive
 from ringsim.rigid.margin import DriveMargin
 from ringsim.scene import Scene
 from ringsim.simulation import simulate

@@ -38,7 +38,11 @@ def mixed() -> xr.Dataset:
 def names_for(campaign: xr.Dataset) -> set[str]:
     """Figures of what campaigns of the kind hold."""
     own = [each for each in PICTURES if each.of == "campaign"]
-    absent = {each.name for each in own if not set(each.needs) <= set(campaign)}
+    absent = {
+        each.name for each in own
+        if not set(each.needs) <= set(campaign)
+        or not all(np.isfinite(campaign[name]).any() for name in each.needs[:1])
+    }  # fmt: skip
     return {each.name for each in own} - absent - {"rare_event", "one_by_one"}
 
 

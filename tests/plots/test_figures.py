@@ -238,11 +238,11 @@ OF_RINGS = {"opening_angles", "asynchrony", "section_map", "rod_stress", "ring",
 
 def test_only_figures_that_apply_are_written(tmp_path, deployed, scene_of, made_run):
     names = {path.name for path in draw_figures(deployed, tmp_path / "all")}
-    assert names == {f"run-fig-{name}.png" for name in OF_RINGS}
+    assert names == {f"run-fig-{name}.png" for name in (*OF_RINGS, "locks")}
     plain = made_run(scene_of(6, parts=False), stress=False)
     paths = draw_figures(plain, tmp_path / "plain")
     assert "run-fig-rod_stress.png" not in {path.name for path in paths}
-    assert len(paths) == len(OF_RINGS) - 1
+    assert len(paths) == len(OF_RINGS)
     for path in paths:
         assert path.read_bytes().startswith(b"\x89PNG")
     assert sorted((tmp_path / "plain").iterdir()) == sorted(paths)

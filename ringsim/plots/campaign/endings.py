@@ -10,11 +10,12 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import ends
-from ringsim.analysis.design import blocks, endings, told, values_of
+from ringsim.analysis.design import blocks, endings, inputs, paths_of, told, values_of
 from ringsim.analysis.intervals import good, used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import bands, head, legend, limits, looks_of
+from ringsim.plots.drives_and_locks import least_rate
 from ringsim.plots.registry import picture
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
@@ -122,9 +123,9 @@ def margin(campaign: xr.Dataset) -> Figure:
     margins = read["drive_margin"].transpose("sample", "time").to_numpy()
     rows = [_over_angle(*each) for each in zip(angles, margins, strict=True)]
     grid = _grid(rows)
-    bands_by_ending(lower, grid, np.array([_laid(grid, *row) for row in rows]), words)
-    least = float(values.min())
-    lower.set_ylim(min(-0.1, 1.08 * least), max(1.0, 1.5 * abs(least)))
+    laid = np.array([_laid(grid, *row) for row in rows])
+    bands_by_ending(lower, grid, laid, words)
+    style.margin_axis(lower, np.append(laid, values.min()))
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
     lower.set_ylabel("Margin of the drive")
     lower.set_xlabel("Mean opening angle (degree)")
@@ -183,7 +184,7 @@ def _laid(grid: Array, angle: Array, margins: Array) -> Array:
 )  # fmt: skip
 def motors(campaign: xr.Dataset) -> Figure:
     """A row a motor, from ``motor_torque`` and ``motor_speed`` (sample, plane, winch, time)."""
-    names = ["motor_torque", "motor_speed", "final_time", "deployment_time"]
+    names = ["motor_torque", "motor_speed", "final_time", "deployment_time", "outcome"]
     read, words = chosen(campaign, names)
     # Motors that have done their work stand still, and would hide those that still wind.
     read = read.where(read["time"] <= xr.DataArray(ends(read), dims="sample"))
@@ -203,6 +204,56 @@ def motors(campaign: xr.Dataset) -> Figure:
     over_time(figure, grid.ravel().tolist(), read, curves, words)
     grid[-1, 0].set_xlabel(style.label(read["time"]))
     head(figure, campaign, "Motors", counted(campaign, words))
+    return figure
+
+
+@picture("campaign", 72, "Opening rate of each V-joint at its latch", ("latch_rate",))
+def latch_rate(campaign: xr.Dataset) -> Figure:
+    """Bands of ``latch_rate`` (sample, plane, section); the least rate at which latches catch."""
+    paths = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
+    drawn = any(path.startswith(("latch.min_rate", "latch[")) or path == "latch" for path in paths)
+    least = np.nan if drawn else least_rate(campaign)
+    return _by_joint(campaign, "latch_rate", "Latch rates", least)
+
+
+@picture("campaign", 74, "Impulse of each stop at the lock of its V-joint", ("lock_impulse",))
+def lock_impulse(campaign: xr.Dataset) -> Figure:
+    """Bands of ``lock_impulse`` (sample, plane, section)."""
+    return _by_joint(campaign, "lock_impulse", "Latch shock")
+
+
+def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.nan) -> Figure:
+    """A panel a plane: median, 5-95 % and 0-100 % over the samples, a place a section."""
+    held = used(campaign)[name].transpose("sample", "plane", "section")
+    planes, sections = held["plane"].values.tolist(), held["section"].values
+    figure = Figure(figsize=(8.4, 2.1 * len(planes) + 1.4))
+    grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for plane, axes in zip(planes, grid, strict=True):
+        own = held.sel(plane=plane).to_numpy()
+        known = np.isfinite(own).any(axis=0)
+        low, lower, middle, upper, high = bands(own[:, known])
+        at = sections[known]
+        axes.vlines(at, low, high, color=style.BLUE, linewidth=1.0, label="0-100 %")
+        axes.vlines(at, lower, upper, color=style.SKY, linewidth=5.0, label="5-95 %")
+        axes.plot(at, middle, "o", color=style.INK, markersize=4, label="median")
+        if least > 0.0:
+            axes.axhline(least, color=style.VERMILLION, linewidth=1.2, linestyle=(0, (5, 2)),
+                         label=f"latches catch from {least:.3g} rad/s on")  # fmt: skip
+        axes.set_title(f"{plane} plane", fontsize=9.5)
+        axes.grid(visible=False, axis="x")
+    grid[0].set_ylim(bottom=0.0)
+    grid[0].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)
+    grid[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
+    grid[-1].set_xlabel(style.label(campaign["section"]))
+    figure.supylabel(style.label(held, width=30), fontsize=10.5)
+    legend(figure, [grid[0]], 4)
+    values = held.to_numpy()
+    some = int(np.isfinite(values).any(axis=(1, 2)).sum())
+    missing = int(np.isnan(values).sum())
+    note = f"{told(campaign, some)}."
+    if missing:
+        note += f" {missing} of {values.size} V-joints of all samples have none."
+    head(figure, campaign, subject, note)
     return figure
 
 

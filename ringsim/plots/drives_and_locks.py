@@ -1,0 +1,150 @@
+"""Figures of a run's drive, motors and locks."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from ringsim.plots import style
+from ringsim.plots.registry import picture
+from ringsim.scene import scene_from_toml
+
+_SOURCES = (
+    style.SKY, style.ORANGE, style.GREEN, style.VERMILLION, style.PURPLE, style.BLUE, style.GREY,
+)  # fmt: skip
+
+
+@picture("run", 110, "Drive and resistance", ("drive_margin", "opening_angle"))
+def drive(dataset: xr.Dataset) -> Figure:
+    """``drive_available``, ``drive_resistance`` and ``drive_margin`` (time) of a run, and
+    ``least_drive_margin``.
+
+    Drawn over the mean opening angle of all V-joints, as long as it grows; resistances that drive
+    are left out.
+    """
+    known = dataset.isel(time=np.flatnonzero(np.isfinite(dataset["drive_margin"].values)))
+    angle = known["opening_angle"].mean(("plane", "section")).values
+    grows = angle >= np.maximum.accumulate(angle)
+    angle, known = angle[grows], known.isel(time=grows)
+    figure = Figure(figsize=(8.0, 6.8))
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 3))
+    kinds = [k for k in known["resistance"].values if (known["drive_resistance"].sel(
+        resistance=k) > 0.0).any()]  # fmt: skip
+    heights = [known["drive_resistance"].sel(resistance=k).clip(min=0.0) for k in kinds]
+    if kinds:
+        upper.stackplot(
+            angle, *(each.values for each in heights), labels=kinds,
+            colors=[_SOURCES[k % len(_SOURCES)] for k in range(len(kinds))], alpha=0.7,
+        )  # fmt: skip
+    upper.plot(
+        angle, known["drive_available"], color=style.INK, label="drive without pulleys' loss"
+    )
+    upper.set_ylim(bottom=0.0)
+    upper.set_ylabel(f"Force on the opening angle ({known['drive_available'].attrs['units']})")
+    figure.legend(*upper.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    margin = known["drive_margin"].values
+    lower.plot(angle, margin, color=style.BLUE)
+    lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    names = ("least_drive_margin_angle", "least_drive_margin")
+    where, least = (float(dataset[name]) for name in names)
+    lower.plot(where, least, "o", color=style.VERMILLION, markersize=6, zorder=4)
+    style.free(lower.text(
+        0.98, 0.95, f"least margin {least:.2f} at {where:.0f} deg", ha="right", va="top",
+        transform=lower.transAxes,
+    ))  # fmt: skip
+    style.margin_axis(lower, margin)
+    lower.set_ylabel("Margin by the standard")
+    lower.set_xlabel("Mean opening angle (deg)")
+    style.head(figure, upper, dataset, "Drive and resistance")
+    return figure
+
+
+_MOTOR = ("motor_current", "motor_torque", "motor_speed", "motor_power")
+_DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1, 1.5)))
+
+
+@picture(
+    "run", 115, "Torque, speed and power of the motors over time", ("motor_torque", "motor_speed")
+)
+def motors(dataset: xr.Dataset) -> Figure:
+    """A panel for each of ``motor_torque``, ``motor_speed``, ``motor_power`` and, where it is
+    known, ``motor_current`` (plane, winch, time); a line a motor.
+    """
+    names = [name for name in _MOTOR if name in dataset and np.isfinite(dataset[name]).any()]
+    figure = Figure(figsize=(8.4, 1.9 * len(names) + 1.3))
+    panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    there = np.isfinite(dataset["motor_torque"].transpose("plane", "winch", "time").to_numpy())
+    places = np.argwhere(there.any(axis=-1)).tolist()
+    for axes, name in zip(panels, names, strict=True):
+        rows = dataset[name].transpose("plane", "winch", "time").to_numpy()
+        for number, (plane, winch) in enumerate(places):
+            called = f"{dataset['plane'].values[plane]} cable"
+            called += f", winch {dataset['winch'].values[winch]}" if rows.shape[1] > 1 else ""
+            axes.plot(dataset["time"], rows[plane, winch], label=called,
+                      color=_LINES[number % len(_LINES)],
+                      linestyle=_DASHES[number % len(_DASHES)])  # fmt: skip
+        axes.set_ylabel(style.label(dataset[name], width=24), fontsize=9)
+        axes.margins(y=0.12)
+    figure.align_ylabels(panels)
+    style.time_axes(dataset, dataset["motor_torque"].max(("plane", "winch")), *panels)
+    handles, words = panels[0].get_legend_handles_labels()
+    figure.legend(handles, words, loc="outside lower center", ncols=len(words))
+    style.head(figure, panels[0], dataset, "Motors")
+    return figure
+
+
+_LINES = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE)
+_LOCKS = ("lock_time", "latch_rate", "lock_impulse")
+_LEAST: dict[str, Any] = {"color": style.VERMILLION, "linewidth": 1.2, "linestyle": (0, (5, 2))}
+_MARKS = (("o", style.BLUE), ("D", style.ORANGE), ("s", style.GREEN))
+
+
+@picture("run", 35, "When and how hard each V-joint locks", ("lock_time",))
+def locks(dataset: xr.Dataset) -> Figure:
+    """A panel for ``lock_time`` and, where they are known, ``latch_rate`` and ``lock_impulse``
+    (plane, section); a mark a V-joint.  A dashed line is the least rate at which a latch catches.
+    """
+    names = [name for name in _LOCKS if name in dataset and np.isfinite(dataset[name]).any()]
+    figure = Figure(figsize=(8.4, 2.1 * len(names) + 1.3))
+    panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    sections, planes = dataset["section"].values, dataset["plane"].values.tolist()
+    for axes, name in zip(panels, names, strict=True):
+        for plane, (marker, colour) in zip(planes, _MARKS, strict=False):
+            values = dataset[name].sel(plane=plane).values
+            axes.plot(sections, values, marker, color=colour, markersize=5, alpha=0.85)
+        axes.set_ylabel(style.label(dataset[name].assign_attrs(long_name=_SAID[name])), fontsize=9)
+        axes.margins(y=0.15)
+        if name != "lock_time":
+            axes.set_ylim(bottom=0.0)
+    entries = [
+        Line2D([], [], linestyle="none", marker=marker, color=colour, label=f"{plane} plane")
+        for plane, (marker, colour) in zip(planes, _MARKS, strict=False)
+    ]
+    least = least_rate(dataset)
+    if "latch_rate" in names and least > 0.0:
+        axes = panels[names.index("latch_rate")]
+        axes.axhline(least, **_LEAST)
+        entries.append(Line2D([], [], label=f"latches catch from {least:g} rad/s on", **_LEAST))
+    figure.align_ylabels(panels)
+    panels[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
+    panels[-1].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)
+    panels[-1].set_xlabel(style.label(dataset["section"]))
+    figure.legend(handles=entries, loc="outside lower center", ncols=len(entries))
+    style.head(figure, panels[0], dataset, "Locks")
+    return figure
+
+
+_SAID = {
+    "lock_time": "time of the lock", "latch_rate": "opening rate at the latch",
+    "lock_impulse": "impulse of the stop",
+}  # fmt: skip
+
+
+def least_rate(dataset: xr.Dataset) -> float:
+    """The opening rate at which latches catch, rad/s; NaN where they differ, or there are none."""
+    latch = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene").latch
+    rates = np.unique([] if latch is None else latch.min_rate)
+    return float(rates[0]) if len(rates) == 1 else np.nan

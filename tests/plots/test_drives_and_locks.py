@@ -1,0 +1,126 @@
+"""Locks, latch rates, motors and margins as the dataset holds them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_motors
+
+from ringsim.analysis.courses import courses, ends
+from ringsim.plots.campaign.endings import latch_rate, lock_impulse, margin
+from ringsim.plots.campaign.endings import motors as motors_of_samples
+from ringsim.plots.drives_and_locks import least_rate, locks, motors
+from ringsim.scene import Scene
+from ringsim.variables import Fate
+
+LEAST = 0.25
+
+
+def latched_scene() -> Scene:
+    """Latches that catch from 0.25 rad/s on."""
+    return made_scene().with_values({"latch": {"min_rate": LEAST}})
+
+
+@pytest.fixture
+def campaign() -> xr.Dataset:
+    """Sample k meets its latches with (k + 1) / 10 rad/s in section 1, twice that in section 2, ..;
+    the last joint of sample 0 meets none.
+    """
+    made = made_campaign(8, failed=(2,)).assign_attrs(scene=latched_scene().to_toml())
+    number = np.arange(1.0, SECTIONS + 1) * 0.1
+    rates = (np.arange(8.0) + 1.0)[:, None, None] * np.stack([number, 0.5 * number])
+    rates[0, 1, -1] = np.nan
+    says = {"units": "rad/s", "long_name": "opening rate"}
+    made["latch_rate"] = ("sample", "plane", "section"), rates, says
+    made["lock_impulse"] = ("sample", "plane", "section"), 3.0 * rates, {"units": "N m s"}
+    return made
+
+
+def test_bands_of_latch_rates_are_those_of_the_samples_that_count(campaign: xr.Dataset) -> None:
+    held = [0, 1, 3, 4, 5, 6, 7]
+    for draw, scale in ((latch_rate, 1.0), (lock_impulse, 3.0)):
+        figure = draw(campaign)
+        for plane, axes in enumerate(figure.axes):
+            own = scale * campaign["latch_rate"].to_numpy()[held, plane]
+            (middle,) = (line for line in axes.lines if line.get_label() == "median")
+            assert middle.get_ydata() == pytest.approx(np.nanmedian(own, axis=0))
+            whole, most = axes.collections
+            ends_of = [segment[:, 1].tolist() for segment in whole.get_segments()]
+            wanted = np.column_stack([np.nanmin(own, axis=0), np.nanmax(own, axis=0)])
+            assert np.array(ends_of) == pytest.approx(wanted)
+            levels = np.nanquantile(own, [0.05, 0.95], axis=0).T
+            assert np.array([s[:, 1] for s in most.get_segments()]) == pytest.approx(levels)
+        words = figure.legends[0].get_title().get_text()
+        assert "7 of 8 samples; left out: 1 " in words
+        assert f"1 of {7 * 2 * SECTIONS} V-joints of all samples have none." in words
+
+
+def test_the_least_rate_is_drawn_unless_it_is_drawn_by_sample(campaign: xr.Dataset) -> None:
+    def line(made: xr.Dataset) -> list[float]:
+        lines = latch_rate(made).axes[0].lines
+        return [each.get_ydata()[0] for each in lines if "catch" in str(each.get_label())]
+
+    assert line(campaign) == [LEAST]
+    law = {"role": "input", "path": "latch.min_rate"}
+    assert line(campaign.assign(latch_min_rate=("sample", np.linspace(0, 1, 8), law))) == []
+    other = latched_scene().with_values({"latch.min_rate[2]": 0.3})
+    assert line(campaign.assign_attrs(scene=other.to_toml())) == []
+    assert np.isnan(least_rate(campaign.assign_attrs(scene=made_scene().to_toml())))
+
+
+def test_locks_of_a_run_stand_by_section(campaign: xr.Dataset) -> None:
+    run = campaign.isel(sample=3, drop=True)
+    panels = locks(run).axes
+    names = ("lock_time", "latch_rate", "lock_impulse")
+    for axes, name in zip(panels, names, strict=True):
+        for row, line in zip(run[name].to_numpy(), axes.lines, strict=False):
+            assert line.get_xdata().tolist() == run["section"].values.tolist()
+            assert line.get_ydata() == pytest.approx(row)
+    assert panels[1].lines[-1].get_ydata()[0] == LEAST
+    assert len(locks(run.drop_vars(["latch_rate", "lock_impulse"])).axes) == 1
+
+
+def test_motors_of_a_run_have_a_panel_a_quantity(campaign: xr.Dataset) -> None:
+    run = with_motors(campaign).isel(sample=3, drop=True)
+    torque, speed = motors(run).axes
+    for axes, name in ((torque, "motor_torque"), (speed, "motor_speed")):
+        rows = run[name].transpose("plane", "winch", "time").to_numpy()[:, 0]
+        for row, line in zip(rows, axes.lines, strict=False):
+            assert line.get_ydata() == pytest.approx(row, nan_ok=True)
+    assert [t.get_text() for t in motors(run).legends[0].get_texts()] == [
+        "upper cable", "lower cable",
+    ]  # fmt: skip
+
+
+def test_the_whole_course_of_the_margin_is_within_its_axis(campaign: xr.Dataset) -> None:
+    made = with_motors(campaign)
+    made["drive_margin"] = made["drive_margin"] * np.where(made["time"] > 4.0, 40.0, 1.0)
+    axes = margin(made).axes[1]
+    low, high = axes.get_ylim()
+    drawn = [line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 2]
+    assert low < min(map(np.nanmin, drawn))
+    assert high > max(map(np.nanmax, drawn)) > 20.0
+
+
+def test_a_ring_whose_latches_missed_is_not_over_when_it_came_to_180_degrees() -> None:
+    """Its motors go on, and it may fold again: neither is taken for a ring that is locked."""
+    made = with_motors(made_campaign(3))
+    made["deployment_time"][:] = 4.0
+    made["final_time"][:] = 9.0
+    made["outcome"][1] = int(Fate.NOT_LATCHED)
+    assert ends(made).tolist() == [4.0, 9.0, 4.0]
+    assert ends(made.drop_vars("outcome")).tolist() == [4.0, 4.0, 4.0]
+    lines = {line.get_label(): line for line in motors_of_samples(made).axes[0].lines}
+    assert lines["deployed (2)"].get_xdata()[-1] == 4.0
+    assert lines["not latched (1)"].get_xdata()[-1] == 9.0
+    over = xr.DataArray(ends(made), dims="sample")
+    made["opening_angle"] = made["opening_angle"].where(made["time"] <= over)
+    held = courses(made, (0.0, 1.0)).bands.sel(time=8.0)
+    angle = made["opening_angle"].isel(sample=1).sel(time=8.0)
+    own = (angle - angle.mean()).transpose("plane", "section").to_numpy()
+    wanted = np.stack([np.minimum(own, 0.0), np.maximum(own, 0.0)])
+    assert held.transpose("quantile", "plane", "section").to_numpy() == pytest.approx(
+        wanted, abs=1e-4
+    )
+    assert TIMES[-1] == 10.0
