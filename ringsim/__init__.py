@@ -46,7 +46,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     word = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
     if "xarray" in sys.modules:  # which takes most of a second: not for a scene alone
-        _register()
+        register()
     return word
 
 
@@ -54,10 +54,10 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__, "__version__"})
 
 
-def _register() -> None:
-    """Let datasets have ``dataset.ring``."""
+def register() -> None:
+    """Let datasets have ``dataset.ring``; it takes xarray, and so the most of a second."""
     importlib.import_module(f"{__name__}.accessor")
 
 
 if "xarray" in sys.modules:
-    _register()
+    register()

@@ -1,7 +1,7 @@
 """What every dataset of ringsim can be asked as ``dataset.ring``.
 
 It is there once a public word of ringsim has been used, or ringsim was imported after xarray; else
-``import ringsim.accessor``.
+``ringsim.register()``.
 """
 
 import functools

@@ -308,28 +308,30 @@ def what_matters(analysis: xr.Dataset) -> Table:
     """Inputs (or groups) that go with each output beyond chance, by the measure of the design, and
     in which direction.
     """
-    measure = next((first for first, _ in SETS if first in analysis), None)
+    measure = _measure(analysis)
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
     rows, quiet, doubtful = [], [], list[str]()
-    told = dict(_indexed(analysis, measure)) if measure else {}
-    known = _correlated(analysis)
-    groups = [name for name in told if name not in quantities()]
-    for output in [n for n in quantities() if n in told or n in known] + groups:
-        found = told[output] if output in told else list(_ranked(analysis, output))
-        found, others = _cleared(analysis, output, found)
-        found = _apart(analysis, output, found)
+    separated = _separated_groups(analysis)
+    for output, names, others in mattering(analysis):
+        if _is_moment(output):
+            continue
         doubtful += [f"{output} by {name}" for name in others[:_MOST_IN_SHORT]]
-        rows += [(output if k == 0 else "", *row) for k, row in enumerate(found[:_MOST_IN_SHORT])]
-        if not found:
+        rows += [
+            (output if k == 0 else "", *_row_of(analysis, output, name))
+            for k, name in enumerate(names[:_MOST_IN_SHORT])
+        ]
+        if not names and output not in separated:
             quiet.append(output)
     notes = measure_notes(analysis)
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         count = analysis.sizes["input"]
-        whose = f"any of {count} inputs" if count > 1 else "the input"
+        whose = f"one of {count} inputs (places and means count)" if count > 1 else "the input"
+        twice = measure in _CHANCE and bool(_correlated(analysis))
+        how = " by its index or its partial rank correlation" * twice
         notes.append(
-            f"listed are links so strong that chance alone gives one to {whose} in fewer than one "
-            "output of 20; of a mean and its parts the stronger"
+            f"chance alone would list {whose}{how} in fewer than one output of "
+            f"{10 if twice else 20}; of a mean and its parts only the strongest is listed"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
@@ -344,37 +346,80 @@ def what_matters(analysis: xr.Dataset) -> Table:
     return marked(Table(head, rows, notes, left=2), analysis, 1)
 
 
-def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]]:
+    """For each output, and then each kind of failure with an index, the inputs (or groups) that
+    matter beyond chance, by their index or else by the rank correlation that holds the others, the
+    larger index first; and the inputs that only go with one of them.
+
+    An index tells how much of the scatter is an input's: beside a strong one a weaker input has no
+    more of it than chance gives, however certain it is.  Its rank correlation shows it.
+    """
+    measure, known = _measure(analysis), _correlated(analysis)
+    indexed = dict(_indexed(analysis, measure)) if measure else {}
+    groups = [name for name in indexed if name not in quantities()]
+    for output in [n for n in quantities() if n in indexed or n in known] + groups:
+        names = list(indexed.get(output, ()))
+        if output in known and (output not in indexed or measure in _CHANCE):
+            values, beyond = standing_out(analysis, output)
+            order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
+            ranked = analysis["input"].values[order[beyond[order]]].astype(str).tolist()
+            if output in indexed:
+                size = analysis[measure].sel(output=output).fillna(0.0).to_series().to_dict()
+                ranked.sort(key=size.__getitem__, reverse=True)
+            names += [name for name in ranked if name not in names]
+        names, others = _cleared(analysis, output, names)
+        yield output, _apart(analysis, output, names), others
+
+
+def _is_moment(output: str) -> bool:
+    """Whether it is when a peak was: what it depends on is told at length alone."""
+    known = quantities().get(output)
+    return known is not None and output.endswith("_time") and not known.badness
+
+
+def _measure(analysis: xr.Dataset) -> str | None:
+    """The index that the design allows; None without any."""
+    return next((first for first, _ in SETS if first in analysis), None)
+
+
+def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[str]]]:
     """For each output with indices the inputs with more than chance gives, in all their interval
-    above zero.
+    above zero, the largest first.
     """
     (dim,) = analysis[measure].dims[1:]
+    names = analysis[dim].values.astype(str)
     for output in analysis["output"].values.tolist():
         one = analysis.sel(output=output)
         values = one[measure].values
-        known = f"{measure}_interval" in one and np.isfinite(one[f"{measure}_interval"]).any()
-        ends = one[f"{measure}_interval"].values if known else np.full((len(values), 2), np.nan)
+        least = _index_ends(one, measure)[:, 0]
         chance = one[_CHANCE[measure]].values if measure in _CHANCE else 0.0 * values
-        least = np.where(np.isfinite(ends[:, 0]), ends[:, 0], values)
-        beyond = (values > chance) & (least > 0.0)
-        chosen = [k for k in np.argsort(-np.nan_to_num(values)) if beyond[k]]
+        beyond = (values > chance) & (np.where(np.isfinite(least), least, values) > 0.0)
         if np.isfinite(values).any():
-            yield output, [
-                (
-                    str(analysis[dim].values[k]), number_text(values[k], 2),
-                    _ends(ends[k]),
-                    *_correlations(analysis, output, str(analysis[dim].values[k])),
-                )
-                for k in chosen
-            ]  # fmt: skip
+            order = np.argsort(-np.nan_to_num(values))
+            yield output, names[order[beyond[order]]].tolist()
 
 
-def _cleared(
-    analysis: xr.Dataset, output: str, found: list[tuple[str, ...]]
-) -> tuple[list[tuple[str, ...]], list[str]]:
-    """The rows, the largest first, of inputs whose index cannot be that of another one, and the
-    names of the others: they go with an input of a larger index, and their partial rank
-    correlation, which holds that, is within chance.
+def _index_ends(one: xr.Dataset, measure: str) -> Array:
+    """Intervals of the indices of one output, shape (input, 2); NaN without."""
+    name = f"{measure}_interval"
+    return one[name].values if name in one else np.full((one[measure].size, 2), np.nan)
+
+
+def _row_of(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ...]:
+    """The cells of an input that matters: name, index and interval, rank correlations."""
+    measure, cells = _measure(analysis), ("-", "-")
+    if measure and output in analysis["output"].values:
+        one = analysis.sel(output=output)
+        (dim,) = one[measure].dims
+        k = one[dim].values.tolist().index(name)
+        cells = number_text(one[measure].values[k], 2), _ends(_index_ends(one, measure)[k])
+    return name, *cells, *_correlations(analysis, output, name)
+
+
+def _cleared(analysis: xr.Dataset, output: str, found: list[str]) -> tuple[list[str], list[str]]:
+    """Of inputs, the largest first, those whose index cannot be that of another one, and the
+    others: they go with an input of a larger index, and their partial rank correlation, which holds
+    that, is within chance.
     """
     paired = partners(analysis)
     # Blocks move one group by itself: their indices are its own.
@@ -383,45 +428,28 @@ def _cleared(
     partial = analysis[f"{output}_partial_rank_correlation"].values
     clear = np.isnan(partial) | standing_out(analysis, output)[1]
     stands = dict(zip(analysis["input"].values.tolist(), clear.tolist(), strict=True))
-    kept, others = list[tuple[str, ...]](), list[str]()
-    for row in found:
-        larger = {each[0] for each in kept}
-        if stands[row[0]] or paired.get(row[0], set()).isdisjoint(larger):
-            kept.append(row)
+    kept, others = list[str](), list[str]()
+    for name in found:
+        if stands[name] or paired.get(name, set()).isdisjoint(kept):
+            kept.append(name)
         else:
-            others.append(row[0])
+            others.append(name)
     return kept, others
 
 
-def _apart(
-    analysis: xr.Dataset, output: str, found: list[tuple[str, ...]]
-) -> list[tuple[str, ...]]:
-    """The rows, the largest first, without those that contain a larger one or lie within it: the
+def _apart(analysis: xr.Dataset, output: str, found: list[str]) -> list[str]:
+    """Of inputs, the largest first, those that do not contain a larger one or lie within it: the
     mean of all pulleys beside that of five of them tells the same twice.
     """
     if "input_of" not in analysis:
         return found
     columns = (analysis[name].values.tolist() for name in ("input", "input_of", "input_span"))
     places = {name: (own, *span) for name, own, span in zip(*columns, strict=True)}
-    kept = apart(analysis, output, [row[0] for row in found], places)
-    return [row for row in found if row[0] in kept]
+    return apart(analysis, output, found, places)
 
 
 def _correlated(analysis: xr.Dataset) -> list[str]:
     return [name for name in quantities() if f"{name}_rank_correlation" in analysis]
-
-
-def _ranked(analysis: xr.Dataset, output: str) -> Iterator[tuple[str, ...]]:
-    """Inputs whose rank correlation with an output without index is beyond chance: the partial one
-    where samples are enough to hold the other inputs.
-    """
-    if output not in _correlated(analysis):
-        return
-    values, beyond = standing_out(analysis, output)
-    for k in np.argsort(-np.abs(np.nan_to_num(values)), kind="stable"):
-        if beyond[k]:
-            name = str(analysis["input"].values[k])
-            yield name, "-", "-", *_correlations(analysis, output, name)
 
 
 def standing_out(analysis: xr.Dataset, output: str) -> tuple[Array, NDArray[np.bool_]]:
@@ -460,18 +488,11 @@ def what_separates(analysis: xr.Dataset) -> Table:
     """Inputs that are larger, or smaller, in samples that ended otherwise or violate."""
     if "group" not in analysis.dims:
         return Table((), ())
-    rows, samples = [], analysis.attrs["samples_run"]
-    normal = float(norm.isf(indices.chance_of_each(analysis.sizes["input"]) / 2))
-    for group in analysis["group"].values:
+    rows = []
+    for group, chosen in _separating(analysis):
         one = analysis.sel(group=group)
         middle, ends = one["separation"].values, one["separation_interval"].values
-        order = np.argsort(-np.abs(np.nan_to_num(middle - 0.5)))
-        own = one["group_samples"].item()
-        # Variance of the area under the curve without a difference: Mann and Whitney (1947).
-        chance = normal * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
-        beyond = _beyond(middle - 0.5, ends - 0.5, chance)
-        chosen = [k for k in order if beyond[k]]
-        first = str(group).split("; ")[0]
+        first = group.split("; ")[0]
         rows += [
             (
                 f"{first} ({one['group_samples'].item()})" if n == 0 else "",
@@ -481,6 +502,28 @@ def what_separates(analysis: xr.Dataset) -> Table:
         ]  # fmt: skip
     head = ("what separates", "input", *DIRECTED)
     return marked(Table(head, rows, left=3), analysis, 1)
+
+
+def _separating(analysis: xr.Dataset) -> Iterator[tuple[str, list[int]]]:
+    """The groups of samples with the inputs that separate them beyond chance, the best first."""
+    samples = analysis.attrs["samples_run"]
+    normal = float(norm.isf(indices.chance_of_each(analysis.sizes["input"]) / 2))
+    for group in analysis["group"].values:
+        one = analysis.sel(group=group)
+        middle, ends = one["separation"].values, one["separation_interval"].values
+        own = one["group_samples"].item()
+        # Variance of the area under the curve without a difference: Mann and Whitney (1947).
+        chance = normal * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
+        beyond = _beyond(middle - 0.5, ends - 0.5, chance)
+        order = np.argsort(-np.abs(np.nan_to_num(middle - 0.5)))
+        yield str(group), order[beyond[order]].tolist()
+
+
+def _separated_groups(analysis: xr.Dataset) -> set[str]:
+    """The groups that some input separates, each by all of its names."""
+    if "group" not in analysis.dims:
+        return set()
+    return {group for group, chosen in _separating(analysis) if chosen}
 
 
 def _beyond(values: Array, ends: Array, chance: Array | float) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ringsim.layout.layout import layout_of
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.stepping.locks import history
 
 # What the base carries, and how it turns.
 
@@ -119,12 +120,17 @@ def unresolved(run: Run) -> str:
     )
 
 
+_DOUBTFUL = 2.5
+"""Factor between a rate and the least that a latch asks for, within which a lock may decide."""
+
+
 def jerked(run: Run) -> str:
     """What a reason says of latches that a lock in the same step may have driven or braked.
 
     Rates are those of the step's begin: where the shock of an earlier lock had a quarter of a
-    period to arrive, the joint met its latch with another one (on `truss2` with half of it).  Empty
-    where no latch asks for a rate.
+    period to arrive, the joint met its latch with another one: on `truss2` with half of it, on
+    rings of 12 sections with 0.96 to 1.05 of it.  Told are the joints for which such a factor,
+    ``_DOUBTFUL``, decides whether the latch catches.  Empty where no latch asks for a rate.
     """
     latch, locks = run.scene.latch, run.locks
     if latch is None or not np.any(np.asarray(latch.min_rate) > 0.0):
@@ -133,15 +139,18 @@ def jerked(run: Run) -> str:
     ahead = (first[..., None, None] == first) & (
         locks[..., None, None] - locks > 0.25 * slowest_period(run)
     )
-    late = np.argwhere(ahead.any(axis=(-2, -1)) & np.isfinite(locks)).tolist()
+    met = history(run.scene, run.angles.times, run.angles.values, run.rates.values).rates
+    asked = np.broadcast_to(np.asarray(latch.min_rate, dtype=float), locks.shape)
+    near = (met < _DOUBTFUL * asked) & (asked < _DOUBTFUL * met)
+    late = np.argwhere(ahead.any(axis=(-2, -1)) & near).tolist()
     if not late:
         return ""
     planes = run.scene.structure.planes
     names = ", ".join(f"{planes[plane]} {section + 1}" for plane, section in late[:_NAMED])
     more = f" and {len(late) - _NAMED} more" if len(late) > _NAMED else ""
     return (
-        f"; {names}{more}: another joint locked in the step that met the latch, whose rate is that "
-        f"before: reduce {_cure(run)}"
+        f"; whether the latch of {names}{more} catches is uncertain, as another joint locked in "
+        f"the same step: reduce {_cure(run)}"
     )
 
 

@@ -28,8 +28,9 @@ PEAK = Peak("peak_tension", ("plane", "span"), "the largest tension", "cable_ten
 class CableTension(Output):
     """Tension of every span, and the largest with its time.
 
-    The largest counts up to the deployment time: winches that go on pulling at a locked ring raise
-    the tension for as long as one cares to simulate.
+    The largest counts until all V-joints have locked: winches that go on pulling at a locked ring
+    raise the tension for as long as one cares to simulate.  While a latch has not caught, they pull
+    at a ring that is not locked, and that counts.
     """
 
     rank = 40
@@ -40,7 +41,7 @@ class CableTension(Output):
         Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
         Variable(
             "peak_tension", (), "N",
-            "largest tension of any span of any cable up to the deployment time",
+            "largest tension of any span of any cable until all V-joints have locked",
             error_bar=ErrorBar("largest tension", safety=1.8),
             summary=("largest tension", "10.3f"), worse="larger", largest_of="cable_tension",
         ),
@@ -59,10 +60,10 @@ class CableTension(Output):
         return found
 
     def reduce(self, run: Run, series: Series) -> Values:
-        """Interpolated, and the largest reading or value at the deployment time."""
+        """Interpolated, and the largest reading or value at the last lock."""
         times, values = series.times, series.values
-        if math.isfinite(run.until):
-            before, last = times <= run.until, np.array([run.until])
+        if math.isfinite(until := run.locked):
+            before, last = times <= until, np.array([until])
             times = np.append(times[before], last)
             values = np.append(values[before], series.at(last), axis=0)
         peak = {"peak_tension": np.nanmax(values)} | PEAK.of(run, times, values)

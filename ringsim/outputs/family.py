@@ -123,6 +123,11 @@ class Run:
         """When the last V-joint reached 180 deg, s; infinite if one did not."""
         return float(np.nan_to_num(self.locks, nan=math.inf).max())
 
+    @property
+    def locked(self) -> float:
+        """When the last V-joint locked, s; infinite if one did not, as its latch missed, say."""
+        return float(np.nan_to_num(self.held, nan=math.inf).max())
+
 
 def output_times(scene: Scene) -> Array:
     """The scene's output grid in s: multiples of ``record.interval`` up to the end time."""

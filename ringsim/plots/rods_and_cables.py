@@ -287,7 +287,7 @@ def cables(dataset: xr.Dataset) -> Figure:
     planes = tension.dropna("plane", how="all")["plane"].values.tolist()
     series = {plane: section_series(dataset, plane) for plane in planes}
     names = list(series[planes[0]])
-    until = style.deployment_time(dataset)
+    until = style.locked_time(dataset)
     until = until if math.isfinite(until) else math.inf
     peak = peak_of(dataset, "cable_tension", "peak_tension", until)
     figure, grid = _by_plane(dataset, planes, len(names), (2.1, 0.8))

@@ -169,6 +169,16 @@ def deployment_time(dataset: xr.Dataset) -> float:
     return float(dataset.get("deployment_time", math.nan))
 
 
+def locked_time(dataset: xr.Dataset) -> float:
+    """Time at which all V-joints were locked (s), NaN if a latch missed or one did not open."""
+    missed = int(dataset.get("outcome", Fate.NONE)) == Fate.NOT_LATCHED
+    return math.nan if missed else deployment_time(dataset)
+
+
+def _all_of(dataset: xr.Dataset) -> str:
+    return "all locked" if math.isfinite(locked_time(dataset)) else "all at 180 deg"
+
+
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
     status, fate = Status(int(dataset["status"])), Fate(int(dataset.get("outcome", Fate.NONE)))
@@ -269,7 +279,7 @@ def time_axes(
     if named:
         side = "right" if moment > 0.5 * sum(panels[0].get_xlim()) else "left"
         panels[0].annotate(
-            f"all locked at {moment:.2f} s", (moment, 1.0),
+            f"{_all_of(dataset)} at {moment:.2f} s", (moment, 1.0),
             xycoords=panels[0].get_xaxis_transform(), xytext=(0, 3),
             textcoords="offset points", ha=side, va="bottom", fontsize=9.5,
         )  # fmt: skip

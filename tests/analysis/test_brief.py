@@ -52,15 +52,17 @@ def test_designs_without_intervals_are_judged_by_what_chance_would_reach():
     assert abs(found.asynchrony_max_rank_correlation.sel(input="x2")) < 1.96 / 31**0.5
     assert found.asynchrony_max_partial_rank_correlation.sel(input="x2") < -0.8
     assert [row[1] for row in table.rows] == ["x1", "x2"]
-    assert (
-        "chance alone gives one to any of 3 inputs in fewer than one output of 20"
-        in table.notes[-1]
+    told = (
+        "chance alone would list one of 3 inputs (places and means count) in fewer than one output"
     )
+    assert f"{told} of 20" in table.notes[-1]
     late = analyse(drawn_campaign(design, linear, 3, 4, lost=lambda x: x[:, 0] > 0.7))
     assert np.isnan(late.separation_interval).all()
     ((group, name, *_),) = what_separates(late).rows
     assert group.startswith("lost")
     assert name == "x1"
+    # What some input separates is not said to depend on none.
+    assert not any("more than chance" in n and "lost" in n for n in what_matters(late).notes)
 
 
 def test_a_mean_beside_its_parts_is_told_once():
@@ -113,3 +115,21 @@ def test_the_short_form_is_shorter_and_names_the_long_one(found):
     assert len(short) < len(long)
     assert any("--full" in line for line in short)
     assert not any("--full" in line for line in long)
+
+
+def test_a_weak_input_beside_a_strong_one_is_told_by_its_rank_correlation():
+    """x1 has all but 1 % of the variance; x2 and x3 have less than chance gives of 20 inputs."""
+
+    def output(x):
+        return 10.0 * (x[:, 0] > 0.5) + 1.0 * x[:, 1] - 0.8 * x[:, 2]
+
+    found = analyse(drawn_campaign(RandomDesign(samples=240), output, 20, 5))
+    one = found.sel(output="asynchrony_max")
+    assert (one.given_data_index < one.chance_level).sel(input=["x2", "x3"]).all()
+    table = what_matters(found)
+    assert sorted(row[1] for row in table.rows) == ["x1", "x2", "x3"]
+    assert table.rows[0][1] == "x1"
+    assert (
+        "by its index or its partial rank correlation in fewer than one output of 10"
+        in (table.notes[1])
+    )

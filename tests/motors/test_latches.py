@@ -16,6 +16,7 @@ from motor_rings import MOTOR, STALL, ring
 from ringsim.analysis.design import endings
 from ringsim.analysis.intervals import quantities
 from ringsim.analysis.requirements import Requirement, violations
+from ringsim.outputs.cables import CableTension
 from ringsim.outputs.family import Run, Series
 from ringsim.outputs.joints import FastestLatch, Latching
 from ringsim.parts.joints import Latch
@@ -241,6 +242,25 @@ def test_the_latest_latch_tells_when_a_motor_stops() -> None:
     np.testing.assert_allclose(run.held, [[1.0, 3.0, np.nan]] * 2, rtol=1e-6)
     again = replace(run, caught=np.array([[True, True, True], [False, False, False]]))
     np.testing.assert_allclose(again.held, [[1.0, 3.0, 1.0], [np.nan] * 3], rtol=1e-6)
+
+
+def test_tensions_count_until_all_latches_have_caught() -> None:
+    """Winches pull on at a ring that is not locked: 2 N more each second."""
+    times = np.linspace(0.0, 4.0, 401)
+    past = np.poly1d([1.0, 1.5, 3.0], r=True) * 0.1
+    angles, rates = (
+        np.tile(each(times)[:, None, None], (1, 2, 3)) for each in (past, past.deriv())
+    )
+    series = [Series(times, each, times) for each in (angles + math.pi, rates)]
+    pull = np.stack([[10.0 + 2.0 * times, 9.0 + times]] * 2).transpose(2, 0, 1)
+    known = {"plane": np.array(["upper", "lower"]), "span": np.arange(1, 3)}
+    for least, ends in ((0.05, 1.0), (0.2, 3.0), (0.4, 4.0)):  # at once, the third time, never
+        scene = latched(latch={"min_rate": least})
+        run = Run(scene, *series, np.full((2, 3), 1.0), {}, known)
+        found = CableTension().reduce(run, Series(times, pull, times))
+        assert found["peak_tension"] == pytest.approx(10.0 + 2.0 * ends)
+        assert found["peak_tension_time"] == pytest.approx(ends)
+        assert (found["peak_tension_plane"], found["peak_tension_span"]) == ("upper", 1)
 
 
 @for_each(

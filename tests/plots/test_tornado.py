@@ -65,7 +65,7 @@ def test_bars_are_the_indices_of_the_analysis(design, measure) -> None:
     np.testing.assert_allclose(widths(figure)[0], longest)
     names = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
     assert names == ["force", "modulus"]
-    assert len(widths(figure)) == (2 if measure == "total_index" else 1)
+    assert len(widths(figure)) == (1 if measure == "mean_absolute_effect" else 2)
     (whiskers, *_) = [line for line in figure.axes[0].collections if len(line.get_segments())]
     ends = known[f"{measure}_interval"].values[np.argsort(-known[measure].values)]
     drawn = [segment[:, 0] for segment in whiskers.get_segments()]

@@ -260,7 +260,8 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
 def peaks(campaign: xr.Dataset) -> xr.DataArray:
     """Largest recorded tension of each span until the last lock, (sample, plane, span), N."""
     found = []
-    for block in blocks(campaign, ["cable_tension", "status", "final_time", "deployment_time"]):
+    names = ["cable_tension", "status", "final_time", "deployment_time"]
+    for block in blocks(campaign, [*names, *(n for n in ["outcome"] if n in campaign)]):
         own = used(block)
         until = xr.DataArray(ends(own), dims="sample")
         found.append(own["cable_tension"].where(own["time"] <= until).max("time", keep_attrs=True))
@@ -298,7 +299,7 @@ def tension(campaign: xr.Dataset) -> Figure:
                      fontsize=10.5)  # fmt: skip
     legend(figure, [grid[0]], 4)
     counted = int(np.isfinite(found.to_numpy()).any(axis=(1, 2)).sum())
-    note = f"{told(campaign, counted)}. At recorded times until the last lock."
+    note = f"{told(campaign, counted)}. At recorded times until all V-joints have locked."
     head(figure, campaign, "Tension along the cables", note)
     return figure
 

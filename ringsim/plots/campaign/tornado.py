@@ -3,7 +3,7 @@
 import itertools
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +25,9 @@ from ringsim.analysis.design import (
     values_of,
 )
 from ringsim.analysis.indices import UNLIKELY, largest_by_chance
-from ringsim.analysis.influence import LEAST, apart, influence
-from ringsim.analysis.intervals import ran
+from ringsim.analysis.influence import LEAST, influence
+from ringsim.analysis.influence_text import mattering
+from ringsim.analysis.intervals import quantities, ran
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
@@ -39,14 +40,17 @@ from ringsim.tables import unit_behind
 MEASURES = {
     "total_index": "Total Sobol' index",
     "mean_absolute_effect": "Mean absolute effect mu*",
-    "given_data_index": "First-order index, from plain samples",
+    "given_data_index": "First-order index",
     "partial_rank_correlation": "Partial rank correlation",
     "rank_correlation": "Rank correlation",
 }
 """What bars can show, the most telling first; a design allows some of them."""
 _COLOURS = {"partial_rank_correlation": style.GREEN, "rank_correlation": style.PURPLE}
 """Of measures that stand beside indices, which are of another colour."""
-_INSIDE = {"total_index": ("first_order_index", "first-order index")}
+_INSIDE = {
+    "total_index": ("first_order_index", "first-order index"),
+    "given_data_index": ("partial_rank_correlation", "partial rank correlation"),
+}
 """What a second, thinner bar shows beside it."""
 _BY_CHANCE = "the largest by chance in one case of 20"
 _MOST = 8
@@ -76,13 +80,15 @@ class Bars(NamedTuple):
 
 def analysed(campaign: xr.Dataset) -> xr.Dataset:
     """The indices that the design of a campaign allows of its main numbers, and rank correlations
-    where some number has no index.
+    but of blocks, which need none.
     """
     names, placed = scalars(campaign), placement(campaign)
     found = sensitivity(campaign, {}, placed, names)
-    if all(_measure(found, name) for name in names):
+    if "factor" in found.dims and all(_measure(found, name) for name in names):
         return found
-    return xr.merge([found, influence(population_of(campaign), {}, placed)])
+    known = [name for name in quantities() if name in campaign]
+    counts = {f"{n}_samples": ("counted", [len(values_of(campaign, n)[0])]) for n in known}
+    return xr.merge([found, influence(population_of(campaign), {}, placed), xr.Dataset(counts)])
 
 
 def _measure(analysis: xr.Dataset, output: str) -> str:
@@ -107,9 +113,7 @@ def bars_of(campaign: xr.Dataset) -> Iterator[tuple[str, Bars]]:
     """
     analysis, names = analysed(campaign), scalars(campaign)
     others = analysis["output"].values.tolist() if "output" in analysis.dims else []
-    known = drawn(campaign)
-    each = zip(known.names, known.input, known.span, strict=True)
-    places = {name: (own, *span) for name, own, span in each}
+    matter = {output: chosen for output, chosen, _ in mattering(analysis)}
     for output in [*names, *(name for name in others if name not in names)]:
         measure, told = _measure(analysis, output), ""
         if output in others:
@@ -120,7 +124,7 @@ def bars_of(campaign: xr.Dataset) -> Iterator[tuple[str, Bars]]:
             )
         if measure or told:
             chance = _chance(analysis, measure, output, len(values_of(campaign, output)[0]))
-            yield output, _bars(analysis, measure, output, told, chance, places)
+            yield output, _bars(analysis, measure, output, told, chance, matter.get(output, []))
 
 
 def _counted(one: xr.Dataset, *, blocks: bool) -> str:
@@ -148,7 +152,7 @@ def _chance(analysis: xr.Dataset, measure: str, output: str, samples: int) -> Ar
 
 def _bars(
     analysis: xr.Dataset, measure: str, output: str, told: str, chance: Array | None,
-    places: Mapping[str, tuple[str, int, int]],
+    matter: list[str],
 ) -> Bars:  # fmt: skip
     if not measure:
         return Bars("", [], *_NONE, np.nan, told)
@@ -159,9 +163,7 @@ def _bars(
     order = order[np.isfinite(values[order])]
     names = analysis[dim].values.astype(str)
     if chance is not None:
-        order = order[np.abs(values[order]) > chance[order]]
-        kept = apart(analysis, output, names[order].tolist(), places)
-        order = order[np.isin(names[order], kept)]
+        order = order[np.isin(names[order], matter)]
     order = order[:_MOST]
 
     def of(variable: str, shape: tuple[int, ...]) -> NDArray[np.floating]:
@@ -213,7 +215,9 @@ def tornado(campaign: xr.Dataset) -> Figure:
         unit = f" ({units})" if bars.measure == "mean_absolute_effect" and units != "1" else ""
         below = f"\n{bars.told}" if bars.told and bars.names else ""
         if bars.names:
-            axes.set_xlabel(f"{MEASURES[bars.measure]}{unit}{below}", fontsize=9)
+            two = np.isfinite(bars.inside).any() and bars.measure in _INSIDE
+            beside = f", and {_INSIDE[bars.measure][1]}" if two else ""
+            axes.set_xlabel(f"{MEASURES[bars.measure]}{unit}{beside}{below}", fontsize=9)
     if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
         legend(figure, panels)
     whiskers = "Whiskers: intervals of 95 %." if certain else ""
@@ -224,6 +228,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
     most = max((len(values_of(campaign, name)[0]) for name in scalars(campaign)), default=0)
     beyond = any(np.isfinite(bars.chance) for _, bars in found)
     of = f"The longest {_MOST} bars at most{', of those that chance would not explain' * beyond}."
+    if any((np.abs(bars.values) < bars.chance).any() for _, bars in found):
+        of += " Where an index ends before the dashed line, the rank correlation is beyond chance."
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", whiskers, of]))
     if quiet:
         caption += f" No input matters more than chance would explain for {', '.join(quiet)}."
@@ -251,7 +257,9 @@ def _draw(axes: Axes, bars: Bars) -> None:
         _row(axes, height - shift, bars.inside, bars.inside_ends, style.ORANGE,
              _INSIDE[measure][1], 0.34)  # fmt: skip
     if np.isfinite(bars.chance):
-        for side in np.unique(np.sign(bars.values)):
+        # An index is a share: what it has below zero is its own error.
+        signed = measure.endswith("rank_correlation")
+        for side in np.unique(np.sign(bars.values)) if signed else (1.0,):
             axes.axvline(side * bars.chance, color=style.VERMILLION, linestyle="dashed",
                          linewidth=1.2, label=_BY_CHANCE)  # fmt: skip
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
@@ -266,7 +274,10 @@ def _row(
 ) -> None:  # fmt: skip
     if not len(values):
         return
-    axes.barh(height, values, height=thick, color=colour, label=label)
+    # Hatched, so that the two are told apart in grey.
+    hatch = "////" if colour == style.ORANGE else ""
+    axes.barh(height, values, height=thick, color=colour, label=label, linewidth=0.0,
+              hatch=hatch, edgecolor="white")  # fmt: skip
     known = np.isfinite(ends).all(axis=1)
     # By their ends, since an interval need not hold the estimate.
     middle, half = ends[known].mean(axis=1), np.ptp(ends[known], axis=1) / 2
