@@ -13,7 +13,7 @@ from ringsim.analysis.intervals import used, worst_sample
 from ringsim.analysis.worst import losses
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
-from ringsim.tables import with_unit
+from ringsim.tables import counted, with_unit
 from ringsim.variables import Variable
 
 _NAMED = 6
@@ -54,6 +54,8 @@ def ending_lines(
         else:
             more = ", ..." if len(own) > _NAMED else ""
             told = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, own[:_NAMED]))}{more})"
+        if why and len(own) > 1:
+            why = f"sample {own[0]}: {why}"
         told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
         told = "" if word in REACHED else told
         if word != UNKNOWN:
@@ -94,7 +96,7 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
     Which end is the worst the output knows: margins and latch rates the least, loads the largest.
 
     Places have no names where samples differ in the ends at which the winches are.  Of outputs that
-    can have an error bar the line says how large that is in this sample.
+    can have an error bar the line says how large that is in this sample, or else in others.
     """
     spans = {}
     if "span_name" in campaign:
@@ -112,7 +114,8 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 values = {str(n): each.values for n, each in worst.variables.items()}
                 told = " ".join(summary(values, spans)[variable.name].split())
                 error = _numerical(sound, variable, worst) if variable.error_bar else ""
-                unknown |= bool(variable.error_bar and not error)
+                unknown |= error is None
+                error = error or ""
                 lines.append(f"{variable.summary[0]} in sample {sample}: {told}{error}{mark}")
     if unknown:
         lines.append(
@@ -122,15 +125,18 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
     return lines
 
 
-def _numerical(sound: xr.Dataset, variable: Variable, worst: xr.Dataset) -> str:
-    """How large the numerical error of a sample's value is; empty if no sample tells."""
+def _numerical(sound: xr.Dataset, variable: Variable, worst: xr.Dataset) -> str | None:
+    """How large the numerical error of other samples' values is if this one does not state its own,
+    which stands behind its value; None if no sample tells.
+    """
     if (name := f"{variable.name}_error") not in sound or not sound[name].notnull().any():
+        return None
+    if np.isfinite(float(worst[name])):
         return ""
-    if np.isfinite(own := float(worst[name])):
-        return f"; numerical error at most {with_unit(f'{own:.2g}', variable.units)}"
     stated = sound[name].dropna("sample")
-    most = with_unit(f"{float(stated.max()):.2g}", variable.units)
+    units = "deg" if variable.units == "degree" else variable.units
+    most = with_unit(f"{float(stated.max()):.2g}", units)
     return (
-        f"; its numerical error is not stated, at most {most} in the {stated.size} samples that "
-        "state theirs"
+        f"; it states no numerical error, the {counted(stated.size, 'sample')} that do have {most} "
+        "at most"
     )

@@ -149,9 +149,8 @@ class Placement:
             )
         if self.independent:
             return (
-                "intervals of 95 %: bootstrap (BCa) of means, bootstrap-t and Bonett's of standard "
-                "deviations (approximate where tails are long: 80 to 88 % of a lognormal whose "
-                "logarithm scatters by 1), order statistics of quantiles, Clopper-Pearson of shares"
+                "intervals of 95 %: bootstrap of means and standard deviations (of less where "
+                "tails are long), order statistics of quantiles, Clopper-Pearson of shares"
             )
         of = "the samples A and B of its blocks alone stand for the population: " * (self.block > 1)
         if self.replicates > 1:
@@ -509,10 +508,10 @@ def open_stored(path: Path) -> xr.Dataset:
             if len(variable.dims) < 2:
                 variable.load()
     except FileNotFoundError:
-        raise InputError(
-            f"{file}: there is no such file or folder: check its name, and the folder that you are "
-            "in"
-        ) from None
+        cure = "there is no such file or folder: check its name, and the folder that you are in"
+        if file.name == MERGED and (file.parent / "design.nc").exists():
+            cure = f"not merged yet: give ringsim merge {file.parent} first, also while it runs"
+        raise InputError(f"{file}: {cure}") from None
     except (OSError, ValueError) as error:
         if file.suffix == ".toml":
             raise InputError(

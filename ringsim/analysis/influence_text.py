@@ -314,7 +314,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
     rows, quiet, doubtful = [], [], list[str]()
     separated = _separated_groups(analysis)
     for output, names, others in mattering(analysis):
-        if _is_moment(output):
+        if is_moment(output):
             continue
         doubtful += [f"{output} by {name}" for name in others[:_MOST_IN_SHORT]]
         rows += [
@@ -371,7 +371,7 @@ def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]
         yield output, _apart(analysis, output, names), others
 
 
-def _is_moment(output: str) -> bool:
+def is_moment(output: str) -> bool:
     """Whether it is when a peak was: what it depends on is told at length alone."""
     known = quantities().get(output)
     return known is not None and output.endswith("_time") and not known.badness
@@ -474,7 +474,9 @@ def _correlations(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ..
         return ("-",) * len(_RANKS)
     one = analysis.sel(input=name)
     known = (f"{output}_{word}rank_correlation" for word in _RANKS)
-    return tuple(_signed(one[each].item(), one[f"{each}_interval"].values) for each in known)
+    cells = [_signed(one[each].item(), one[f"{each}_interval"].values) for each in known]
+    # The one that holds the other inputs says more, and one is enough.
+    return (cells[0], "-") if cells[0] != "-" else tuple(cells)
 
 
 def _signed(value: float, ends: Array) -> str:

@@ -10,6 +10,7 @@ import xarray as xr
 from ringsim.analysis.design import placement, population_of
 from ringsim.analysis.influence_text import (
     influence_tables,
+    is_moment,
     refusals,
     sensitivity_tables,
     what_matters,
@@ -155,7 +156,12 @@ def sections(analysis: xr.Dataset, folder: str = "DIR") -> dict[str, Section]:
     found = (
         Section("tail", "Rare event", [tail_table(analysis)]),
         Section("outcomes", "Outcomes", [outcome_table(analysis)]),
-        Section("statistics", "Numbers", [statistics_table(analysis)], [every_statistic(analysis)]),
+        Section(
+            "statistics",
+            "Numbers",
+            [statistics_table(analysis)],
+            [statistics_table(analysis, every=True), every_statistic(analysis)],
+        ),
         Section(
             "errors",
             "What makes the numbers wrong",
@@ -259,7 +265,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             more = counted(further, "further sample")
             taken = counted(one["samples_lost"], "lost sample")
             kept = f", with {taken} as violations" * bool(one["samples_lost"])
-            notes.append(f"{name}: {more} without a violation would show it{kept}")
+            bad, used = one["samples_violating"], one["samples_used"]
+            so_far = f"{bad} of {used} violate it so far; " * bool(bad)
+            notes.append(f"{name}: {so_far}{more} without a violation would show it{kept}")
         if verdict != alone:
             notes.append(
                 f"{name}: it would be {alone.words} if lost samples were as the others, which "
@@ -307,10 +315,14 @@ def _parts() -> list[str]:
     return [f"first {part:.0%}" for part in PARTS[:-1]]
 
 
-def statistics_table(analysis: xr.Dataset) -> Table:
-    """Mean with its interval, scatter, quantiles and range of each output, and its worst sample."""
+def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
+    """Mean with its interval, scatter, quantiles and range of each output, and its worst sample;
+    of when peaks were only if ``every`` one is told.
+    """
     rows, few, alike = [], False, list[str]()
     for name in outputs_in(analysis):
+        if is_moment(name) and not every:
+            continue
         values, counts = analysis[name].values, analysis[f"{name}_samples"].values
         mean, deviation, *quantiles, least, most = values
         used, run = counts[0], counts[:3].sum()  # what has not run is the last
@@ -399,8 +411,10 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
     """The error budget: what makes means wrong, by how much and where it is largest, as far as
     there is more than the error of sampling (or ``every`` one); then errors of the solution itself.
     """
-    rows = []
+    rows, wanted = [], every
     for name in outputs_in(analysis):
+        if is_moment(name) and not wanted:
+            continue
         errors, counts, largest, samples = (
             analysis[f"{name}_{word}"].values
             for word in ("error_of_mean", "error_samples", "largest_error", "largest_error_sample")
@@ -431,6 +445,7 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
             for name, median, largest, sample, count in zip(
                 analysis["balance"].values, *columns, strict=True
             )
+            if largest > NOTHING  # frames have no gap in any joint
         ]
         of_solution = "error of the solution", "median", "largest", "samples"
         tables.append(marked(Table(of_solution, balances), analysis))

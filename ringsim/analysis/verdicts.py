@@ -249,6 +249,10 @@ _MEANING = {
 }  # fmt: skip
 
 
+_FINAL = ("deployment_time", "asynchrony_max", "least_latch_rate", "peak_latch_rate")
+"""Outputs that do not change any more once every V-joint has come to 180 deg."""
+
+
 def _judged(
     campaign: xr.Dataset, name: str, wanted: Requirement, placed: Placement, rule: Rule | None
 ) -> dict[str, float]:
@@ -257,6 +261,8 @@ def _judged(
     absent = used & np.isnan(numbers(campaign, name)) if name != OUTCOME else ~used & used
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
     short = used & ~broken & _ended_short(campaign)
+    if name in _FINAL and "deployment_time" in campaign:  # then, whatever becomes of latches
+        short &= ~np.isfinite(campaign["deployment_time"].to_numpy())
     place = campaign["sample"].to_numpy()
     levels = wanted.confidence, wanted.confidence
     looked = int((campaign["status"].to_numpy() >= 0).sum())

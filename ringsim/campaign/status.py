@@ -5,6 +5,9 @@ import json
 import time
 from collections import Counter
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.campaign.folder import Folder
 from ringsim.campaign.run import growth_told
@@ -14,7 +17,7 @@ from ringsim.storage.result import sample_of
 from ringsim.tables import counted
 from ringsim.variables import Status
 
-_TOLD = {"state", "host", "pid", "workers", "elapsed", "updated", "done", "done_before", "running"}
+_TOLD = {"state", "host", "pid", "workers", "updated", "running", "spent", "ended"}
 _MOST_SHOWN = 10
 
 
@@ -50,7 +53,8 @@ def status_lines(campaign: Folder) -> list[str]:
     lines += [f"  {line}" for line in endings]
     if every := len(campaign.checked):
         lines.append(f"  checked        {every - len(campaign.unchecked())} of {every}")
-    running, rate = dict[int, float](), 0.0
+    running, workers = dict[int, float](), 0
+    spent, ended = np.zeros(2), np.zeros(2)
     for path in sorted(campaign.path.glob("progress-*.json")):
         told = None
         with contextlib.suppress(OSError, ValueError):
@@ -64,10 +68,12 @@ def status_lines(campaign: Folder) -> list[str]:
         since = max(0.0, now - told["updated"])
         if state == "running":
             running |= {int(number): lasts + since for number, lasts in told["running"].items()}
-            rate += (told["done"] - told["done_before"]) / max(told["elapsed"] + since, 1e-9)
+            workers += told["workers"]
+            spent, ended = spent + told["spent"], ended + told["ended"]
+        called = "workers" if writer == "all" else writer
         lines.append(
-            f"  {writer:<14} {state}, {counted(told['workers'], 'worker')}, "
-            f"process {told['pid']} on {told['host']}, {since:.0f} s ago"
+            f"  {called:<14} {state}, {counted(told['workers'], 'worker')}, "
+            f"process {told['pid']} on {told['host']}, heard of {since:.0f} s ago"
         )
     checks = campaign.survey(checks=True)
     unfinished = [
@@ -78,11 +84,22 @@ def status_lines(campaign: Folder) -> list[str]:
         longest = sorted(unfinished, key=lambda item: -item[1])[:_MOST_SHOWN]
         listed = ", ".join(f"{_named(number)} ({seconds:.0f} s)" for number, seconds in longest)
         lines.append(f"  running        {len(unfinished)}: {listed}")
-    if rate > 0.0:
-        lines.append(f"  rate           {rate:.3g} samples/s")
-        of = " for these" if growth else ""
-        lines.append(f"  time left      about {in_words(left / rate)}{of}")
+    if workers and ended[0]:
+        lines.append(f"  rate           {workers * ended[0] / max(spent[0], 1e-9):.3g} samples/s")
+        about = _left(campaign, left, spent / np.maximum(ended, 1), workers)
+        lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     return lines
+
+
+def _left(campaign: Folder, samples: int, each: NDArray[np.float64], workers: int) -> str:
+    """About how long samples, and checks by the other engine, take that are left; ``each`` are the
+    seconds of one of either, 0 where none has ended.
+    """
+    checks = len(campaign.unchecked())
+    told = f"about {in_words((samples * each[0] + checks * each[1]) / workers)}"
+    if checks and not each[1]:
+        told += f" and {counted(checks, 'check')}, which take longer"
+    return told
 
 
 def _stopping(campaign: Folder, planned: int, end: End | None) -> list[str]:

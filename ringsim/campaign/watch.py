@@ -87,6 +87,7 @@ class Progress:
     def __post_init__(self) -> None:
         self._before, self._news, self._written = self.done, False, -_FILE_SECONDS
         self._checked = 0
+        self._spent, self._ended = [0.0, 0.0], [0, 0]
         self._begin = self._told = time.monotonic()
         notebook = "ipykernel" in sys.modules
         # Without its widgets tqdm warns, and shows less than its bar of letters does.
@@ -117,9 +118,12 @@ class Progress:
 
     def finished(self, result: Result) -> None:
         """Note that it has ended."""
-        self.running.pop(result.sample, None)
+        now = time.monotonic()
+        is_check = sample_of(result.sample) != result.sample
+        self._spent[is_check] += now - self.running.pop(result.sample, now)
+        self._ended[is_check] += 1
         self._news = True
-        if sample_of(result.sample) != result.sample:
+        if is_check:
             self._checked += 1
             self._bar.set_postfix(self._counts())
         else:
@@ -151,6 +155,8 @@ class Progress:
             "state": state, "host": platform.node(), "pid": os.getpid(), "workers": self.workers,
             "elapsed": now - self._begin, "updated": time.time(), "total": self.total,
             "done": self.done, "done_before": self._before, "failed": self.failed,
+            # Seconds of workers that samples and checks took, and how many of either have ended.
+            "spent": self._spent, "ended": self._ended,
             "running": {sample: now - begin for sample, begin in self.running.items()},
         }  # fmt: skip
         with contextlib.suppress(OSError), whole(self.path, lasting=False) as draft:

@@ -7,7 +7,7 @@ import click
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import notes
-from ringsim.analysis.design import MERGED, median_and_worst, open_stored
+from ringsim.analysis.design import MERGED, called, inputs, median_and_worst, open_stored
 from ringsim.analysis.engines import check_lines
 from ringsim.analysis.requirements import parse_requirements, required_by
 from ringsim.campaign.folder import open_folder
@@ -384,6 +384,9 @@ def _only(dataset: xr.Dataset, names: tuple[str, ...], formats: tuple[str, ...])
     if not {"csv", "mat"} & set(formats):
         raise InputError("--variables: says nothing to --format pvd: leave it out")
     known = [str(name) for name in dataset.data_vars]
+    # Inputs have the names that analyse and the report give them, too.
+    own = {called(dataset[name]): name for name in inputs(dataset)}
+    names = tuple(own.get(name, name) for name in names)
     for name in names:
         if name not in known:
             hint = known_or_nearest(name, known)

@@ -32,7 +32,7 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.balance import rules
 from ringsim.parts.solver import Solver
-from ringsim.refusal import InputError
+from ringsim.refusal import InputError, show
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import Watch
 from ringsim.stepping.instant import Instant
@@ -242,6 +242,15 @@ def _with_accuracy(
     return scene.with_values(values), picked.fidelity
 
 
+def _rounded(value: Any) -> str:
+    """A drawn value for people; ``--scene`` prints it with all digits."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_rounded, value))}]"
+    return show(value)
+
+
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -286,7 +295,7 @@ def replay_command(
     if told := other_build(campaign):
         click.echo(told)
     for path, value in values.items():
-        click.echo(f"{path} = {value}")
+        click.echo(f"{path} = {_rounded(value)}")
     result = solve(load_solver(solver), campaign.scene, number, values)
     if result.log:
         click.echo(result.log)
@@ -299,7 +308,7 @@ def replay_command(
         coordinates = {name: arrays.pop(name) for name in COORDINATES if name in arrays}
         outcome = Outcome(result.status, result.reason, coordinates, arrays, result.cause)
         write(to_dataset(outcome, exact), save)
-        click.echo(f"{save}: written")
+        click.echo(f"wrote {save}")
     if before is None:
         click.echo("there is no stored result to compare with")
     elif different := _differences(result, before):

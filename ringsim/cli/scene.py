@@ -2,6 +2,7 @@
 
 import json
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +17,7 @@ from ringsim.files import require_place, write_text
 from ringsim.layout.layout import Layout, internal_mobility, layout_of
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
-from ringsim.overrides import place_of
+from ringsim.overrides import flat, place_of
 from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.refusal import InputError, known_or_nearest, show
@@ -111,9 +112,14 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
         for text in margin_lines(substituted(loaded)):
             click.echo(text)
         return
-    for label, text in _summary(loaded).items():
-        if text:
-            click.echo(f"{label:<12}{text}")
+    told = {label: text for label, text in _summary(loaded).items() if text}
+    wide = max(map(len, told)) + 2
+    for label, text in told.items():
+        lines = textwrap.wrap(text, _COLUMNS - wide, break_long_words=False, break_on_hyphens=False)
+        click.echo(f"{label:<{wide}}{lines[0]}")
+        for line in lines[1:]:
+            click.echo(" " * wide + line)
+    click.echo(f"valid: ringsim run {scene} runs it")
 
 
 def _summary(scene: Scene) -> dict[str, str]:
@@ -127,12 +133,16 @@ def _summary(scene: Scene) -> dict[str, str]:
         **scene.structure.describe(),
         **_layout(scene),
         "assembly": _assembly(scene),
-        **{name: _fields(part) for name, part in parts.items() if part is not None},
+        **{
+            label: text for name, part in parts.items() if part is not None
+            for label, text in _described(name, part.model_dump()).items()
+        },
         "faults": "; ".join(map(_fields, scene.faults)),
         "friction": ", ".join(friction),
-        "left out": ", ".join(name for name, out in absent.items() if out) or "nothing",
+        "left out": ", ".join(name for name, out in absent.items() if out).replace("_", " ")
+        or "nothing",
         "solver": _fields(scene.solver),
-    }
+    }  # fmt: skip
 
 
 def _layout(scene: Scene) -> dict[str, str]:
@@ -187,16 +197,46 @@ def _mobility(layout: Layout) -> str:
 
 
 def _fields(part: Model) -> str:
-    table = part.model_dump()
+    return _listed(part.model_dump())
+
+
+def _listed(table: dict[str, Any]) -> str:
+    """Kind, then keys and values; of tables within it by their paths."""
     return ", ".join(
-        str(value) if key == "kind" else f"{key} = {show(value)}" for key, value in table.items()
-    )
+        str(value) if key == "kind" else f"{key} = {_shortened(value)}"
+        for key, value in flat(table).items() if value is not None
+    )  # fmt: skip
+
+
+def _described(name: str, table: dict[str, Any]) -> dict[str, str]:
+    """A part by a label: its own values, and one more for each table within it."""
+    inner = {key: value for key, value in table.items() if isinstance(value, dict)}
+    own = {key: value for key, value in table.items() if key not in inner}
+    label = name.replace("_", " ")
+    found, seen = {label: _listed(own)}, dict[str, str]()
+    for key, value in inner.items():
+        text = _listed(value)
+        found[f"{label}.{key}"] = seen.get(text, text)
+        seen.setdefault(text, f"as {label}.{key}")
+    return found
+
+
+def _shortened(value: Any) -> str:
+    """A value; of a long list how many values and from where to where."""
+    if isinstance(value, (list, tuple)) and len(value) > _MOST_LISTED:
+        if all(isinstance(each, (int, float)) for each in value):
+            return f"{len(value)} values from {min(value):g} to {max(value):g}"
+        return f"{len(value)} values"
+    return show(value)
 
 
 # The table of ``ringsim check --margin``.
 
 
 _ANGLES = 13
+_COLUMNS = 110
+"""Letters of a line of ``ringsim check``."""
+_MOST_LISTED = 6
 
 
 def margin_lines(scene: Scene) -> Iterator[str]:
@@ -235,20 +275,22 @@ def margin_lines(scene: Scene) -> Iterator[str]:
         ]
         for row, now in enumerate(first)
     ]
-    of_it = [f"of it {source}" for source in sources]
+    of_it = [f"by {source}" for source in sources]
     yield from text_table(["angle (deg)", "drive", *of_it, *kinds, *drives], rows)
     for name, drive in drives.items():
-        yield f"{name}: margin = {_formula(drive)}"
+        yield f"{name}: margin = {_formula(drive, kinds)}"
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least())}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
 
 
-def _formula(drive: DriveMargin) -> str:
-    """The standard's factors in words."""
+def _formula(drive: DriveMargin, kinds: list[str]) -> str:
+    """The standard's factors in words, of what resists anywhere."""
     standard = drive.standard
-    resisting = " + ".join(f"{factor:g} {kind}" for kind, factor in drive.factors.items())
+    resisting = " + ".join(
+        f"{factor:g} {kind}" for kind, factor in drive.factors.items() if kind in kinds
+    )
     springs = any(one in drive.factors for one in ("springs", "net", "lines"))
     driving = f", springs times {standard.driving_spring:g}" if springs else ""
     speed = f" + {standard.inertia:g} inertia" if standard.keep_speed else ""
@@ -281,7 +323,7 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
         return
     struck = any(hasattr(one, "cable") and one.time <= AT_ONCE for one in scene.faults)
     if cables.upper == cables.lower and not struck:
-        yield "each plane has half of the drive"
+        yield "both planes drive alike: each gives half of it"
         return
     for number, plane in enumerate(scene.structure.planes):
         drive = PlaneMargin(scene, standard, number)

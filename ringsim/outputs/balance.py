@@ -122,8 +122,9 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             number = int(number) if variable.dtype.startswith("i") else number
             unit = {"degree": " deg", "1": ""}.get(variable.units, f" {variable.units}")
             text = f"{number:{variable.summary[1]}}{unit}"
-            if (bar := values.get(f"{variable.name}_error")) is not None:
-                text += f" +- {np.asarray(bar).item():.2g}"
+            bar = np.asarray(values.get(f"{variable.name}_error", np.nan)).item()
+            if np.isfinite(bar):  # samples of a campaign need not have one
+                text += f" +- {bar:.2g}"
             found[variable.name] = f"{text} {output().told(values, span_names)}".rstrip()
     return found
 

@@ -271,7 +271,7 @@ def missed(values: Values, planes: Sequence[str]) -> str:
     names = [f"{planes[plane]} {section + 1}" for plane, section in open_]
     more = f" and {len(names) - 6} more" if len(names) > 6 else ""
     count = f"{len(names)} of {values['latched'].size} latches did not catch"
-    return f"; {count}: {', '.join(names[:6])}{more}"
+    return f"{count}: {', '.join(names[:6])}{more}"
 
 
 # The shock of every lock.

@@ -199,9 +199,12 @@ def ended(
     if not status.failed and fate is not Fate.OVERLOADED:
         fate = Fate.OVERLOADED if passed else Fate.SLACKENED if loose else fate
     passed += loose
-    passed += missed(values, coordinates.get("plane", np.array([])).tolist())
+    lost = missed(values, coordinates.get("plane", np.array([])).tolist())
+    # What a ring that is not latched lacks comes before how it came to rest.
+    first = fate is Fate.NOT_LATCHED and bool(lost)
+    parts = [lost, str(reason) + passed] if first else [str(reason) + passed, lost]
     values["outcome"] = np.array(int(fate))
-    return Outcome(status, str(reason) + passed, coordinates, values, reason.cause)
+    return Outcome(status, "; ".join(filter(None, parts)), coordinates, values, reason.cause)
 
 
 def reduced(

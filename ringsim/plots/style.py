@@ -377,6 +377,8 @@ def write(figure: Figure, path: Path) -> None:
 HEAVY = 120_000
 """Bytes of SVG above which a figure goes into a page as PNG."""
 _DPI = 110
+_TALL = 0.7
+"""Height over width from which on a figure takes a printed sheet of its own."""
 _PIXELS = 96.0
 """Of a page in an inch; figures larger than drawn would have words larger than the page's."""
 
@@ -389,7 +391,9 @@ def inline(figure: Figure, name: str, words: str, heavy: int = HEAVY) -> str:
     The same figure gives the same text.  Ids begin with ``name``, since all figures of a page
     share one space of them, and matplotlib numbers them alike in each.
     """
-    size = f'style="max-width: {_PIXELS * figure.get_size_inches()[0]:.0f}px"'
+    wide, high = figure.get_size_inches()
+    tall = ' class="tall"' * bool(high > _TALL * wide)
+    size = f'style="max-width: {_PIXELS * wide:.0f}px"{tall}'
     held = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name}):
         figure.savefig(held, format="svg", metadata={"Date": None})

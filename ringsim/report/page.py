@@ -89,9 +89,11 @@ def _comments(text: str) -> dict[str, str]:
     return found
 
 
-_ANSWERS = ("one_by_one", "rare_event", "distributions", "margin", "fan", "tornado")
+_ANSWERS = ("one_by_one", "rare_event", "distributions", "margin", "fan", "latch_rate")
 """Figures that answer what campaigns are run for, in the order in which they are told; the first
-``_FIRST`` of them stand on the first page, all others are evidence."""
+``_FIRST`` of them stand on the first page, all others are evidence, but ``_MATTERS``, which stands
+where it is told what matters."""
+_MATTERS = "tornado"
 _FIRST = 3
 
 
@@ -143,7 +145,9 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
         "provenance": list(tables.provenance(campaign)),
     }  # fmt: skip
-    return written("page.html.j2", context, [(p.name, p.words, f) for p, f in drawn])
+    figures = [(p.name, p.words, f) for p, f in drawn]
+    beside = _MATTERS if "matters" in context["told"] else ""
+    return written("page.html.j2", context, figures, beside=beside)
 
 
 def _turn(name: str) -> int:

@@ -22,11 +22,13 @@ LARGEST = 2_000_000
 
 
 def written(
-    template: str, context: Mapping[str, Any], drawn: Sequence[tuple[str, str, "Figure"]]
-) -> str:
+    template: str, context: Mapping[str, Any], drawn: Sequence[tuple[str, str, "Figure"]],
+    beside: str = "",
+) -> str:  # fmt: skip
     """The page of a template: ``figures`` in it are name, words and element of each one drawn.
 
-    They are lines as long as the page stays below ``LARGEST`` with them, then pictures.
+    The one named ``beside`` is not among these, but ``mattering``.  They are lines as long as the
+    page stays below ``LARGEST`` with them, then pictures.
     """
     shell = jinja2.Environment(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
@@ -36,10 +38,15 @@ def written(
     shape, text = shell.get_template(template), ""
     for heavy in (HEAVY, HEAVY // 4, 0):
         figures = [(name, words, inline(f, name, words, heavy)) for name, words, f in drawn]
-        text = shape.render({**context, "figures": figures})
+        text = shape.render({**context, **_apart(figures, beside)})
         if len(text.encode("utf-8")) <= LARGEST:
             break
     return text
+
+
+def _apart(figures: list[tuple[str, str, str]], name: str) -> dict[str, Any]:
+    own = [each for each in figures if each[0] == name]
+    return {"figures": [each for each in figures if each not in own], "mattering": own}
 
 
 def _sentence(line: str) -> str:

@@ -1,5 +1,6 @@
 """What a report tells of the campaign beside its analysis: plain rows of text."""
 
+import re
 import shlex
 from collections import Counter
 from collections.abc import Iterator
@@ -25,6 +26,8 @@ from ringsim.variables import Cause
 MOST_FAILURES = 100
 """Rows of the table of failures; the page says how many more there are."""
 _SHOWN = ("title", "source", "execution", "seed", "solver", "identity", "date_created")
+_PLACES = re.compile(r"(?:(?:upper|lower) )?\d[\d.e+-]*(?:, )?|samples?|latches|latch")
+"""What differs between antennas that ended alike: V-joints by name, numbers, and plurals."""
 _MOST_NAMED = 20
 """Samples of a row that are named."""
 Rows = list[list[str]]
@@ -34,18 +37,23 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
     """Samples, ending, cause, reason, command that repeats the first; how many rows are left out.
 
     Runs that lost their numbers, and sound ones in which the antenna fell short of its goal; a row
-    for all that ended in the same way.
+    for all that ended in the same way.  Antennas end in the same way that differ by places and
+    numbers: the row has the words of the first.
     """
     words, goals = endings(campaign), (*REACHED, UNKNOWN, NOT_RUN)
     causes = {int(cause): cause.words for cause in Cause if cause}
     codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
     alike: dict[tuple[str, str, str], list[int]] = {}
+    first: dict[tuple[str, str, str], str] = {}
     for place, sample in enumerate(campaign["sample"].values.tolist()):
         if words[place] not in goals:
             how = str(words[place]), causes.get(int(codes[place]), ""), str(reasons[place])
-            alike.setdefault(how, []).append(sample)
+            shape = how if how[0].startswith(LOST) else (*how[:2], _PLACES.sub("", how[2]))
+            first.setdefault(shape, how[2])
+            alike.setdefault(shape, []).append(sample)
     rows = []
-    for how, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith(LOST)):
+    for shape, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith(LOST)):
+        how = *shape[:2], first[shape]
         named = ", ".join(map(str, samples[:_MOST_NAMED]))
         named += f" and {len(samples) - _MOST_NAMED} more" * (len(samples) > _MOST_NAMED)
         rows.append([named, *how, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])

@@ -42,16 +42,17 @@ def draw(
     states its error bars, none for 0.  InputError if the scene refuses a path or its values.
     """
     factors: dict[str, Distribution] = {}
-    written: set[str] = set()
+    written: dict[str, str] = {}
     for name, distribution in inputs.items():
         places = _places(base, name, distribution)
         for path in _paths_of(name, distribution):
             own = {with_number(base, f"{path}{place}") for place in places}
-            if twice := own & written:
+            if twice := own & written.keys():
                 raise InputError(
-                    f"inputs: {min(twice)} is drawn twice: leave out one of its inputs"
+                    f"inputs: {min(twice)} is drawn twice, by {written[min(twice)]} and by {name}: "
+                    "leave out one of them"
                 )
-            written |= own
+            written |= dict.fromkeys(own, name)
         factors |= {f"{name}{place}": distribution for place in places}
     drawn = design.table(factors, correlations, seed=seed, folder=folder)
     samples = len(next(iter(drawn.values()))) if drawn else getattr(design, "samples", 1)

@@ -421,13 +421,16 @@ class PantographRing(Structure):
         chord = 2.0 * (self.half_bar + self.hinge_offset)
         major, (x, y) = geometry.plan[0, 0], geometry.plan[1, :2]
         minor = abs(y) / math.sqrt(1.0 - (x / major) ** 2)
+        round_ = abs(major - minor) < 1e-6 * major
+        axes = f"{2.0 * chord * major:.4f} m and {2.0 * chord * minor:.4f} m"
+        whole = f"a circle of {2.0 * chord * major:.4f} m"
+        curve = whole if round_ else f"an ellipse with axes {axes}"
         degrees = math.degrees(self.opening_angle)
         meant = f" ({self.opening_angle} rad would be {degrees:.4g} deg)" if degrees < 180.0 else ""
         return {
             "structure": f"{kind_of(self)}, {shape}, {self.sections} section"
             + "s" * (self.sections > 1),
-            "polygon": f"equal chords of {chord:.4f} m on an ellipse with axes "
-            f"{2.0 * chord * major:.4f} m and {2.0 * chord * minor:.4f} m",
+            "polygon": f"equal chords of {chord:.4f} m on {curve}",
             "deployed": _size(geometry, 0.0),
             "initial": f"{_size(geometry, self.coordinate)} at {self.opening_angle} deg{meant}",
         }

@@ -23,7 +23,8 @@ def test_the_numerical_error_of_a_sample_that_is_named_stands_beside_its_value()
 
     (line,) = told([0.1, np.nan, 0.3, np.nan, 0.25])
     assert "in sample 4: 24" in line
-    assert line.endswith("; numerical error at most 0.25 N")
+    assert " N +- 0.25 at 5 s" in line
     (line,) = told([0.1, np.nan, 0.3, np.nan, np.nan])
-    assert line.endswith("not stated, at most 0.3 N in the 2 samples that state theirs")
+    assert line.endswith("; it states no numerical error, the 2 samples that do have 0.3 N at most")
+    assert "nan" not in line
     assert sum("error_bars_every" in line for line in peak_lines(made)) == 1

@@ -57,7 +57,7 @@ def test_a_dead_winch_is_told_beside_a_strong_one(scene: Scene, tmp_path: Path) 
     assert re.search(
         r"^  lower: 1e-07 % .* least margin -1.000 at \S+ deg: NOT enough$", text, re.M
     )
-    assert "each plane has half" in told(tmp_path / "even.toml", scene)
+    assert "both planes drive alike" in told(tmp_path / "even.toml", scene)
 
 
 def test_where_round_off_resists_there_is_no_number(scene: Scene, tmp_path: Path) -> None:

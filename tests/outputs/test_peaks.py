@@ -96,7 +96,8 @@ def test_tension_tells_plane_and_span() -> None:
 def test_tension_after_the_deployment_does_not_count() -> None:
     tensions = np.zeros((9, 2, 6))
     tensions[3, 0, 0], tensions[6, 1, 3] = 20.0, 30.0
-    run = run_of(np.ones((9, 2, 2)), np.zeros((9, 2, 2)), until=1.3)[0]
+    angles = np.pi + np.broadcast_to((TIMES - 1.3)[:, None, None], (9, 2, 2))
+    run = run_of(angles, np.ones((9, 2, 2)), until=1.3)[0]
     found = CableTension().reduce(run, Series(TIMES, tensions, run.angles.grid))
     assert (found["peak_tension"], found["peak_tension_time"]) == (20.0, TIMES[3])
     assert (found["peak_tension_plane"], found["peak_tension_span"]) == ("upper", 1)

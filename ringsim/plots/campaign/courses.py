@@ -87,7 +87,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     if one is not None:
         lines += [Line2D([], [], color=style.INK, linewidth=0.9, label=f"worst: sample {worst}")]
     figure.legend(handles=[*words, *bands, *lines], loc="outside lower center", ncols=3)
-    note = "After its end a run that deployed counts as in step, any other as it ended."
+    note = "After its end a deployed ring counts as in step, any other keeps its last deviation."
     head(figure, campaign, "Ahead and behind", f"{told(campaign, len(read.samples))}. {note}")
     return figure
 
@@ -168,7 +168,10 @@ def shares(campaign: xr.Dataset) -> tuple[Array, Array, Array]:
     return first, last, never
 
 
-@picture("campaign", 70, "How often each V-joint locks first, last and not at all", ("lock_time",))
+@picture(
+    "campaign", 70, "How often each V-joint comes to 180 deg first, last or not at all",
+    ("lock_time",),
+)  # fmt: skip
 def lock_order(campaign: xr.Dataset) -> Figure:
     """Bars by plane and section from ``lock_time`` (sample, plane, section)."""
     sections, planes = campaign["section"].values, campaign["plane"].values.tolist()
@@ -176,8 +179,8 @@ def lock_order(campaign: xr.Dataset) -> Figure:
         figsize=(float(np.clip(0.42 * len(sections) + 2.0, 6.4, 11.0)), 1.9 * len(planes) + 1.4)
     )
     grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    looks = (("locks first", style.BLUE, ""), ("locks last", style.ORANGE, "//"),
-             ("does not lock", style.GREY, ".."))  # fmt: skip
+    looks = (("first at 180 deg", style.BLUE, ""), ("last", style.ORANGE, "//"),
+             ("not at all", style.GREY, ".."))  # fmt: skip
     drawn = [
         (look, table) for look, table in zip(looks, shares(campaign), strict=True) if table.any()
     ]
@@ -197,6 +200,6 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     legend(figure, [grid[0]])
     locks = locks_of(campaign)
     done = int(np.isfinite(locks).all(axis=(1, 2)).sum())
-    note = f"all V-joints lock in {done}, only these have a last one."
+    note = f"all V-joints come to 180 deg in {done} samples, only these have a last one."
     head(figure, campaign, "Lock order", f"{told(campaign, len(locks))}; {note}")
     return figure

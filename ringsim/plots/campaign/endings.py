@@ -44,7 +44,9 @@ def counted(campaign: xr.Dataset, words: NDArray[np.str_]) -> str:
     """How many samples hold, how many of them are drawn, and what bands and lines are."""
     count = int(good(campaign).sum())
     drawn = "" if len(words) == count else f" {len(words)} of them are drawn."
-    return f"{told(campaign, count)}.{drawn} Bands: all of an ending, lines: their median."
+    return (
+        f"{told(campaign, count)}.{drawn} Bands span the samples of an ending, lines are medians."
+    )
 
 
 def bands_by_ending(axes: Axes, x: Array, values: Array, words: NDArray[np.str_]) -> None:
