@@ -64,10 +64,10 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         notes.append(f"no partial correlation, which holds the other inputs: {', '.join(lacking)}")
     if rows:
         chance = (
-            f"the intervals of about {(1 - LEVEL) * len(names):.2g} of them leave out zero"
+            f"about {(1 - LEVEL) * len(names):.2g} of their intervals leave out zero"
             if certain else f"one in twenty reaches {1.96 / (least - 1) ** 0.5:.2g}"
         )  # fmt: skip
-        notes.append(f"told are the largest of {len(names)} inputs: by chance alone {chance}")
+        notes.append(f"the largest of {len(names)} inputs are listed; by chance alone {chance}")
         notes += confounding_notes(analysis, named)
     head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
     return marked(Table((*head, "used"), rows, notes), analysis)
@@ -90,7 +90,7 @@ def _separated(analysis: xr.Dataset) -> Table:
     return marked(Table(head, rows, notes), analysis)
 
 
-DIRECTED = ("beside the others it is", "95 % interval")
+DIRECTED = ("compared with the others", "95 % interval")
 """Heads of ``directed``."""
 
 
@@ -200,14 +200,14 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
             if failed:  # what did not fail has no value because of what the antenna did
                 cures.append(f"mend the {failed} that failed (ringsim campaign --retry-failed)")
             yield (
-                f"no index of {who}: {counted(count, 'sample')} without a value, and which ones "
-                f"depends on inputs ({p}), so that the others are another population: see what "
-                f"separates them, {', '.join(cures)}, or narrow the inputs"
+                f"no index of {who}: {counted(count, 'sample')} without a value, and inputs decide "
+                f"which ({p}), so that the others do not stand for all: see what separates them, "
+                f"{', '.join(cures)}, or narrow the inputs"
             )
         else:
             yield (
-                f"{who}: {counted(count, 'sample')} without a value, as far as one can tell "
-                f"whatever their inputs are ({p}); they{blocks} are left out"
+                f"{who}: {counted(count, 'sample')} without a value{blocks} left out: no input "
+                f"seems to decide which ({p})"
             )
 
 
@@ -336,8 +336,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
         notes.append(
-            "not told, because an input of larger index that goes with it explains it (its partial "
-            f"rank correlation is within chance): {', '.join(doubtful)}"
+            "not listed, as another input of larger index goes with it and explains it (with that "
+            f"one held, its rank correlation is within chance): {', '.join(doubtful)}"
         )
     if quiet:
         notes.append(f"no input matters more than chance would explain for {', '.join(quiet)}")

@@ -39,8 +39,8 @@ _ROUND_OFF = 1e-9
 _ZERO = 273.15
 """0 C in K."""
 NOTE_ON_UNUSUAL = (
-    "unusual is an input that one sample in five, at most, has as far out on the same side; in "
-    "brackets the distance from the median of all samples, of temperatures the value in C"
+    "unusual inputs are those that at most one sample in five has as far out; in brackets the "
+    "difference from the median of all samples, of temperatures the value in C"
 )
 
 

@@ -309,7 +309,7 @@ def separates(file: File, rows: list[dict[str, str]]) -> None:
 def directed(area: float, inside: int, outside: int, row: dict[str, str]) -> None:
     """Larger or smaller, in so many of all pairs, in percent."""
     word, share = re.fullmatch(
-        r"(\w+) in (\S+) % of pairs", row["beside the others it is"]
+        r"(\w+) in (\S+) % of pairs", row["compared with the others"]
     ).groups()
     assert word == ("larger" if area >= 0.5 else "smaller")
     area = max(area, 1.0 - area)

@@ -346,7 +346,7 @@ def test_what_matters_is_that_of_the_analysis() -> None:
         ["asynchrony_max by force", "0.75", "0.65 .. 0.85", "0.6", "0.5 .. 0.7", "7", "1"],
         ["asynchrony_max by rods", "0.25", "0.15 .. 0.35", "0.2", "0.1 .. 0.3", "7", "1"],
     ]  # fmt: skip
-    assert "whatever their inputs are (p = 0.4)" in gate.notes[0]
+    assert "no input seems to decide which (p = 0.4)" in gate.notes[0]
 
 
 @pytest.mark.usefixtures("_undrawn")

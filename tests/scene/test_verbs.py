@@ -56,6 +56,18 @@ def test_check_says_what_is_built() -> None:
         line(summary, "left out")
         == "cables, gravity, latch, offload, spacecraft, joint friction, stress output"
     )
+    assert summary.splitlines()[-1].startswith("valid")
+
+
+def test_check_tells_parts_within_parts_by_name_and_on_lines_that_can_be_read() -> None:
+    lines = run("check", "ring18-motor").splitlines()
+    assert max(map(len, lines)) <= 110
+    labels = [each.partition("  ")[0] for each in lines]
+    assert {"cables.upper", "cables.lower", "hinge spring"} <= {*labels}
+    assert 'winch.winding.kind = "motor"' in line("\n".join(lines), "cables.upper")
+    # A second part that is as the first is told so.
+    even = run("check", "ring18-cable")
+    assert line(even, "cables.lower") == "as cables.upper"
 
 
 def test_mass_is_the_sum_of_its_parts() -> None:
