@@ -3,7 +3,9 @@
 import contextlib
 import os
 import re
+import resource
 import secrets
+import shutil
 import tomllib
 from collections.abc import Iterator
 from importlib.resources.abc import Traversable
@@ -11,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ringsim.refusal import InputError
+from ringsim.tables import size_text
 
 DRAFT = ".draft"
 """How names of files end that are still being written; nobody reads them."""
@@ -105,7 +108,25 @@ def writing(path: Path, cure: str = "make room or choose another folder") -> Ite
         yield
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path}: cannot be written: {reason}; {cure}") from error
+        raise InputError(f"{path}: cannot be written: {reason}{_short(path)}; {cure}") from error
+
+
+_LITTLE_LEFT = 1e9
+
+
+def _short(path: Path) -> str:
+    """What a disk or a limit leaves, in words, where it is little: HDF5 says "Permission denied" of
+    a full disk, and "HDF error" of a limit.
+    """
+    told = ""
+    with contextlib.suppress(OSError):
+        folder = next(each for each in (path, *path.absolute().parents) if each.is_dir())
+        if (free := shutil.disk_usage(folder).free) < _LITTLE_LEFT:
+            told += f", {size_text(free)} are left on this disk"
+    most = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    if most != resource.RLIM_INFINITY:
+        told += f", files may have {size_text(most)} here (ulimit -f)"
+    return told
 
 
 @contextlib.contextmanager

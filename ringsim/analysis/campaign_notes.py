@@ -54,7 +54,7 @@ def ending_lines(
         else:
             more = ", ..." if len(own) > _NAMED else ""
             told = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, own[:_NAMED]))}{more})"
-        if why and len(own) > 1:
+        if why and len(own) > 1 and not word.startswith(LOST):
             why = f"sample {own[0]}: {why}"
         told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
         told = "" if word in REACHED else told

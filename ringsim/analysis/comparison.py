@@ -208,6 +208,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             "first": str(one.attrs.get("title", "")), "second": str(other.attrs.get("title", "")),
             "first_name": names[0], "second_name": names[1],
             "pairing": pairs.told, "pairs": len(pairs.first),
+            "first_samples": one.sizes["sample"], "second_samples": other.sizes["sample"],
             "intervals": next(
                 (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
             ),

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.intervals import NOTHING, all_alike, quantities
+from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section, digits_of
 from ringsim.analysis.worst import NOTE, marked
 from ringsim.tables import Table, interval_text, number_text, slim, unit_text, with_unit
@@ -27,7 +27,11 @@ def compared(found: xr.Dataset) -> list[str]:
 
 def head_lines(found: xr.Dataset) -> list[str]:
     """Which two, how their samples are paired, lost runs that bend it, and missing intervals."""
-    pairs = f" ({found.attrs['pairs']} pairs)" if found.attrs["pairs"] > 1 else ""
+    pairs = ""
+    if (count := found.attrs["pairs"]) > 1:
+        sizes = found.attrs["first_samples"], found.attrs["second_samples"]
+        rest = "" if set(sizes) == {count} else f" of {sizes[0]} and {sizes[1]} samples"
+        pairs = f" ({count} pairs{rest})"
     lines = list[str]()
     for side, name in zip(("first", "second"), names_of(found), strict=True):
         title = found.attrs[side]
@@ -73,26 +77,24 @@ def _settings(found: xr.Dataset) -> Table:
 
 
 def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
-    """Counts of all samples, shares of those compared, and their differences."""
-    rows = []
+    """Counts and shares of the samples compared, and the difference of the shares; counts alone of
+    all samples where there are no shares.
+    """
+    rows, single = [], found.attrs["pairs"] == 1
     for name in found[dim].values if dim in found.dims else ():
         one = {str(n): v.values for n, v in found.sel({dim: name}).items()}
-        counts = one[f"{word}_compared"].tolist()
+        shares, of = one[f"{word}_share"].tolist(), one[f"{word}_compared"].tolist()
+        counts = one[f"{word}_samples"].tolist()
+        if np.isfinite(shares).all() and not single:
+            each = zip(shares, of, strict=True)
+            cells = [f"{round(share * n)} of {n} ({number_text(share, 3)})" for share, n in each]
+        else:
+            cells = [str(count) for count in counts]
         low, high = one[f"{word}_share_difference_interval"].tolist()
-        rows.append((
-            str(name),
-            *map(str, one[f"{word}_samples"]),
-            *(number_text(share, 3) for share in one[f"{word}_share"]),
-            number_text(one[f"{word}_share_difference"].item(), 3),
-            interval_text(low, high, 3),
-            str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
-        ))  # fmt: skip
-    first, second = names_of(found)
-    heads = (
-        head, first, second, f"share in {first}", f"in {second}", "difference", "95 % interval",
-        "samples",
-    )  # fmt: skip
-    columns = 3 if found.attrs["pairs"] == 1 else len(heads)
+        apart = number_text(one[f"{word}_share_difference"].item(), 3)
+        rows.append((str(name), *cells, apart, interval_text(low, high, 3)))
+    heads = (head, *names_of(found), "difference", "95 % interval")
+    columns = 3 if single else len(heads)
     return marked(Table(heads[:columns], [row[:columns] for row in rows]), found)
 
 
@@ -102,7 +104,7 @@ def _changed(found: xr.Dataset) -> Table:
     if not pairs:
         return Table((), ())
     if not changed:
-        return Table((), (), ["no outcome differs"])
+        return Table((), (), ["no outcome differs"] if pairs > 1 else ["the outcome is the same"])
     names = ("changed_sample_first", "changed_outcome_first", "changed_outcome_second")
     listed = zip(*(found[name].values[:_NAMED] for name in names), strict=True)
     rows = [(str(sample), str(first), str(second)) for sample, first, second in listed]
@@ -116,7 +118,7 @@ def _outputs(found: xr.Dataset) -> Table:
     """Means of both, their difference with its interval, and the pair that differs most."""
     rows, alike = [], list[str]()
     for name, variable in quantities().items():
-        if f"{name}_difference" not in found:
+        if f"{name}_difference" not in found or is_moment(name):
             continue
         first, second = found[f"{name}_mean"].values
         if np.isnan(first) and not found.attrs["pairs"]:
@@ -142,7 +144,8 @@ def _outputs(found: xr.Dataset) -> Table:
             largest, place,
         ))  # fmt: skip
     head = (
-        "output", "unit", *names_of(found), "difference", "in %", "95 % interval", "worse in",
+        "output" if found.attrs["pairs"] == 1 else "mean of", "unit", *names_of(found),
+        "difference", "in %", "95 % interval", "worse in",
         "samples", "largest of a pair", "in sample",
     )  # fmt: skip
     columns = 8 if found.attrs["pairs"] == 1 else len(head)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import placement, population_of
-from ringsim.analysis.intervals import CHECKED, good, numbers, quantities
+from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quantities
 from ringsim.analysis.ladder import Rung, references
 from ringsim.outputs.family import Array
 from ringsim.tables import counted, text_table
@@ -100,6 +100,7 @@ def check_lines(campaign: xr.Dataset) -> list[str]:
             _or_dash(each.bars[each.worst]), _or_dash(each.standard_error),
         )
         for each in found
+        if not is_moment(each.name) and each.apart.any()
     ]  # fmt: skip
     if rows:
         head = (

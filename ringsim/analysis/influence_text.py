@@ -10,7 +10,7 @@ from scipy.stats import norm
 from ringsim.analysis import indices
 from ringsim.analysis.indices import UNLIKELY
 from ringsim.analysis.influence import apart, confounding_notes, partners
-from ringsim.analysis.intervals import LEVEL, quantities
+from ringsim.analysis.intervals import LEVEL, is_moment, quantities
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, chance_text, counted, interval_text, number_text
@@ -369,12 +369,6 @@ def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]
             names += [name for name in ranked if name not in names]
         names, others = _cleared(analysis, output, names)
         yield output, _apart(analysis, output, names), others
-
-
-def is_moment(output: str) -> bool:
-    """Whether it is when a peak was: what it depends on is told at length alone."""
-    known = quantities().get(output)
-    return known is not None and output.endswith("_time") and not known.badness
 
 
 def _measure(analysis: xr.Dataset) -> str | None:

@@ -386,6 +386,12 @@ def quantities() -> dict[str, Variable]:
     }  # fmt: skip
 
 
+def is_moment(output: str) -> bool:
+    """Whether it is when a peak was: what it depends on is told at length alone."""
+    known = quantities().get(output)
+    return known is not None and output.endswith("_time") and not known.badness
+
+
 def numbers(campaign: xr.Dataset, name: str) -> Array:
     """A variable over samples as floats, NaN where it is missing, or the variable itself is."""
     if name not in campaign:

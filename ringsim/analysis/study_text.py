@@ -10,7 +10,6 @@ import xarray as xr
 from ringsim.analysis.design import placement, population_of
 from ringsim.analysis.influence_text import (
     influence_tables,
-    is_moment,
     refusals,
     sensitivity_tables,
     what_matters,
@@ -20,6 +19,7 @@ from ringsim.analysis.intervals import (
     LEAST_OF_BOOTSTRAP,
     NOTHING,
     all_alike,
+    is_moment,
     numbers,
     quantities,
     ranks,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ringsim.campaign.folder import open_folder, other_build
+from ringsim.campaign.specification import SOLVERS
 from ringsim.choice import kind_of
 from ringsim.cli.options import (
     ANIMATE,
@@ -260,8 +261,9 @@ Arrays = dict[str, NDArray[Any]]
 @click.option("--scene", is_flag=True, help="Print the sample's scene and do not run it.")
 @click.option("--check", is_flag=True, help="Repeat the sample's check by the full engine instead.")
 @click.option("--save", metavar="FILE", type=PATH, help="Write the run to a netCDF file.")
+@click.option("--solver", "allowed", hidden=True, default="", help="As of ringsim campaign.")
 def replay_command(
-    folder: Path, sample: int, *, scene: bool, check: bool, save: Path | None
+    folder: Path, sample: int, *, scene: bool, check: bool, save: Path | None, allowed: str
 ) -> int:
     """Run SAMPLE of the campaign in FOLDER again in this process, and compare the results.
 
@@ -285,6 +287,13 @@ def replay_command(
                 f"--check: the samples of {folder} have no checks (check_every): leave it out"
             )
         solver, number = campaign.attributes["judge"], check_of(sample)
+    modules = {name.partition(":")[0] for name in (*SOLVERS.values(), allowed) if name}
+    if solver.partition(":")[0] not in modules:
+        # A file from elsewhere must not choose what code runs.
+        raise InputError(
+            f"{folder}: its design.nc names the solver {solver!r}, which is none of ringsim's "
+            f"({', '.join(SOLVERS.values())}): replay the campaign with the ringsim that ran it"
+        )
     before = next(campaign.survey(checks=check).results([sample]), None)
     values = campaign.table.values_of(sample) | (before.overrides if before is not None else {})
     exact = campaign.scene.with_values(values)

@@ -119,7 +119,7 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
         click.echo(f"{label:<{wide}}{lines[0]}")
         for line in lines[1:]:
             click.echo(" " * wide + line)
-    click.echo("valid: ringsim run runs it")
+    click.echo("valid: ringsim run FILE runs it")
 
 
 def _summary(scene: Scene) -> dict[str, str]:

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from ringsim.analysis.comparison import paired
 from ringsim.analysis.comparison_text import differing, names_of
-from ringsim.analysis.design import endings, population_of, scalars, values_of
+from ringsim.analysis.design import blocks, endings, population_of, scalars, values_of
 from ringsim.analysis.intervals import good, numbers, tells_of
 from ringsim.outputs.family import Array
 from ringsim.plots import style
@@ -46,9 +46,10 @@ def figures_of_both(
         if names:
             yield "values", "Distribution of each main number in both", values(found, both, names)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
-    names = [n for n in names if all(np.isfinite(_course(e, n)[1]).any() for e in both)]
-    if names:
-        yield "courses", "Courses over time in both", courses(found, both, names)
+    drawn = {name: [_course(each, name) for each in both] for name in names}
+    read = {n: rows for n, rows in drawn.items() if all(np.isfinite(r).any() for _, r in rows)}
+    if read:
+        yield "courses", "Courses over time in both", courses(found, both, read)
 
 
 @style.styled
@@ -129,17 +130,18 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
 
 
 @style.styled
-def courses(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
+def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Array]]]) -> Figure:
     """A panel a quantity over time: of runs their course, of campaigns the median with a band from
-    5 to 95 % of the samples that still run.
+    5 to 95 % of the samples that still run; ``read`` has times and rows of both by quantity.
     """
     single = "sample" not in both[0].dims
-    figure = Figure(figsize=(8.2, 2.3 * len(names) + 1.2))
-    grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, name in zip(grid, names, strict=True):
+    figure = Figure(figsize=(8.2, 2.3 * len(read) + 1.2))
+    grid = figure.subplots(len(read), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (name, rows_of) in zip(grid, read.items(), strict=True):
         drawn = []
-        for each, called, (colour, dashes) in zip(both, names_of(found), _LOOKS, strict=True):
-            time, rows = _course(each, name)
+        for (time, rows), called, (colour, dashes) in zip(
+            rows_of, names_of(found), _LOOKS, strict=True
+        ):
             drawn.append(rows)
             if len(rows) > 1:
                 axes.fill_between(time, rows[0], rows[-1], color=colour, alpha=0.2, linewidth=0.0)
@@ -153,8 +155,11 @@ def courses(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
     grid[-1].set_xlabel(style.label(both[0]["time"]))
     grid[0].set_xlim(0.0, max(float(_last(each)) for each in both))
     legend(figure, [*grid])
-    more = "" if single else ", median and 5 to 95 % of the samples that still run"
-    style.title(figure, "Over time: {} and {}".format(*names_of(found)) + more)
+    style.title(figure, "Over time: {} and {}".format(*names_of(found)))
+    if not single:
+        words = "Lines are medians, bands 5 to 95 % of the samples that still run."
+        figure.legends[0].set_title(words)
+        figure.legends[0].get_title().set_fontsize(9)
     return figure
 
 
@@ -168,16 +173,20 @@ def _course(dataset: xr.Dataset, name: str) -> tuple[Array, Array]:
     time = dataset["time"].to_numpy()
     last = int(np.clip(np.searchsorted(time, _last(dataset)), 1, len(time) - 1))
     at = np.unique(np.linspace(0, last, min(last + 1, _RECORDS)).round().astype(int))
-    values = dataset[name].isel(time=at)
-    if "sample" in dataset.dims:
-        values = values.isel(sample=np.flatnonzero(good(dataset)))
-    places = [dim for dim in values.dims if dim not in ("sample", "time")]
-    if places:
-        values = getattr(values, _COURSES[name][0])(places)
-    if "sample" not in values.dims:
-        return time[at], values.to_numpy()[None]
-    held = values.transpose("sample", "time").to_numpy()
+    if "sample" not in dataset.dims:
+        return time[at], _over_places(dataset[name], name).isel(time=at).to_numpy()[None]
+    parts = [
+        _over_places(block[name], name).transpose("sample", "time").to_numpy()[good(block)][:, at]
+        for block in blocks(dataset, [name, "status"])
+    ]
+    held = np.concatenate(parts)
     rows = np.full((len(_BANDS), len(at)), np.nan)
     known = np.isfinite(held).any(axis=0)
     rows[:, known] = np.nanquantile(held[:, known], _BANDS, axis=0)
     return time[at], rows
+
+
+def _over_places(values: xr.DataArray, name: str) -> xr.DataArray:
+    """The mean, or the largest, of a quantity over its planes, sections and so on."""
+    places = [dim for dim in values.dims if dim not in ("sample", "time")]
+    return getattr(values, _COURSES[name][0])(places) if places else values

@@ -171,7 +171,8 @@ def _map(axes: Axes, cells: xr.Dataset, kinds: list[str]) -> None:
     axes.set_xticks(range(len(x)), [_short(v) for v in x], fontsize=8)
     axes.set_yticks(range(len(y)), [_short(v) for v in y], fontsize=8)
     axes.grid(visible=False)
-    axes.set_title(style.plain(str(cells["title"].values)), color=style.INK, weight="bold")
+    title = textwrap.fill(str(cells["title"].values), 40)  # as wide as the panel
+    axes.set_title(style.plain(title), color=style.INK, weight="bold")
     axes.set_xlabel(_label(cells, "x", 44), fontsize=9)
     axes.set_ylabel(_label(cells, "y", 32), fontsize=9)
 

@@ -24,11 +24,8 @@ def write_comparison(found: xr.Dataset, first: xr.Dataset, second: xr.Dataset, o
 def page(found: xr.Dataset, first: xr.Dataset, second: xr.Dataset) -> str:
     """The page as text: nothing in it refers to another file or address."""
     names, both = names_of(found), (first, second)
-    called = found.attrs["first"] or names[0], found.attrs["second"] or names[1]
-    if called[0] == called[1]:
-        called = found.attrs["first_name"], found.attrs["second_name"]
     context = {
-        "title": f"What differs: {called[1]} against {called[0]}",
+        "title": f"What differs: {found.attrs['second_name']} against {found.attrs['first_name']}",
         "notes_on_all": head_lines(found), "told": sections(found),
         "names": {name: first[name].attrs.get("long_name", "") for name in differing(found)},
         "sides": [

@@ -99,7 +99,7 @@ class Bench:
         if ranks:
             mpi = [MPIEXEC or "mpiexec", "-n", str(ranks)]
             front = [*mpi, sys.executable, "-m", "mpi4py", "-m", "ringsim"]
-        end = ["--solver", solver] if solver and arguments[0] == "campaign" else []
+        end = ["--solver", solver] if solver and arguments[0] in ("campaign", "replay") else []
         return [*front, *map(str, arguments), *end]
 
     def environment(self):

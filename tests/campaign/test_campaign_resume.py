@@ -152,11 +152,11 @@ def test_status_tells_outcomes_as_the_end_of_the_campaign_does(bench):
     assert not (bench.folder / "out" / "campaign.nc").exists()
     told = bench.run("status", "out")
     assert "deployed: 1 of 4\n" in told  # of those that have run
-    assert "stalled: 2 of 4 (samples 2, 4): nothing drives it" in told
+    assert "stalled: 2 of 4 (samples 2, 4): sample 2: nothing drives it" in told
     whole = bench.run("campaign", file, "--out", "out", solver="fake_solver:fated")
     for line in (
         "deployed: 2 of 8\n",
-        "stalled: 3 of 8 (samples 2, 3, 4): nothing drives it\n",
+        "stalled: 3 of 8 (samples 2, 3, 4): sample 2: nothing drives it\n",
         "solver failed: 3 of 8, first sample 5: Newton does not converge: try a smaller step\n",
     ):
         assert line in whole

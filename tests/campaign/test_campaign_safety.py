@@ -6,13 +6,18 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import time
+from types import SimpleNamespace
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
 from campaign_bench import MODULES, Bench, comparable, journals, lose, opened, records
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.status import _left
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +150,39 @@ def test_stop_signal_ends_the_campaign_and_it_goes_on_later(number, bench):
     assert not (bench.folder / "out" / "campaign.nc").exists()
     bench.run(*start, solver="fake_solver:slow")
     assert (bench.result("out").status == 0).all()
+
+
+def test_a_file_that_may_not_grow_is_told_with_the_limit(copied):
+    """As HDF5 tells it: "HDF error"."""
+    (copied.folder / "out" / "campaign.nc").unlink()
+    command = f"ulimit -f 1; exec {sys.executable} -m ringsim merge out"
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=copied.folder, env=copied.environment(), text=True,
+        capture_output=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert "files may have 1 kB here (ulimit -f)" in done.stderr
+    assert not (copied.folder / "out" / "campaign.nc").exists()
+
+
+def test_replay_runs_no_code_that_a_file_names(copied):
+    path = copied.folder / "out" / "design.nc"
+    with netCDF4.Dataset(path, "a") as file:
+        file.solver = "os:system"
+    printed = copied.run("replay", "out", "0", code=2)
+    assert "names the solver 'os:system', which is none of ringsim's" in printed
+
+
+def test_time_left_counts_samples_and_checks_apart(copied):
+    """Two of ten samples are to run, of 4 s each, and two checks of 30 s, by two workers."""
+    folder = open_folder(copied.folder / "out")
+    left, each = 2, np.array([4.0, 30.0])
+    checked = SimpleNamespace(unchecked=lambda: np.array([0, 5]))
+    assert _left(checked, left, each, 2) == "about 34 s"
+    assert _left(checked, left, np.array([4.0, 0.0]), 2) == (
+        "about 4 s and 2 checks, which take longer"
+    )
+    assert _left(folder, left, each, 2) == "about 4 s"
 
 
 def test_stop_signal_reaches_all_ranks(bench, mpi):

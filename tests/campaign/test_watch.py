@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from ringsim.campaign.watch import stopping_on_signals
+from ringsim.campaign import watch
+from ringsim.campaign.watch import Progress, stopping_on_signals
 from ringsim.refusal import InputError
 from ringsim.storage.netcdf import locked
+from ringsim.storage.result import check_of
+from ringsim.variables import Status
 
 pytestmark = pytest.mark.quick
 
@@ -47,3 +52,19 @@ def test_a_lock_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").touch()
     with pytest.raises(InputError, match="lock: is a link"), locked(tmp_path / "lock"):
         pass
+
+
+def test_progress_tells_what_samples_and_checks_took(tmp_path: Path) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(watch.time, "monotonic", lambda: 0.0)
+        progress = Progress(tmp_path / "progress.json", "x", 3, 0, 0, 1, checks=1)
+        for number, begin, end in ((0, 10.0, 14.0), (check_of(0), 14.0, 44.0), (1, 44.0, 50.0)):
+            patched.setattr(watch.time, "monotonic", lambda begin=begin: begin)
+            progress.started(number)
+            patched.setattr(watch.time, "monotonic", lambda end=end: end)
+            progress.finished(SimpleNamespace(sample=number, status=Status.OK))
+        progress.close("done")
+    told = json.loads((tmp_path / "progress.json").read_text())
+    assert told["spent"] == [10.0, 30.0]
+    assert told["ended"] == [2, 1]
+    assert told["done"] == 2

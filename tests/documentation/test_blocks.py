@@ -130,3 +130,12 @@ def test_the_tutorial_takes_twelve_lines_of_python(tmp_path: Path) -> None:
     assert names["inputs"] == file["inputs"]
     written = names["study"]._described.specification
     assert (written.seed, written.design.samples) == (file["seed"], file["design"]["samples"])
+
+
+def test_the_list_of_printed_texts_has_them_with_their_values_and_no_docstring() -> None:
+    command = [sys.executable, ROOT / "docs" / "printed_texts.py"]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "no input matters more than chance would explain for {', '.join(quiet)}" in listed
+    assert "## ringsim/report/page.html.j2" in listed
+    assert "Lists every text that" not in listed
+    assert "How far a campaign is, also while its folder is being filled" not in listed

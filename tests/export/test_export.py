@@ -102,6 +102,10 @@ def test_chosen_variables_alone_are_written(file: Path, campaign: xr.Dataset) ->
     assert list(table) == ["sample", "asynchrony_max (degree)", "status"]
     np.testing.assert_allclose(table.iloc[:, 1], campaign["asynchrony_max"], rtol=1e-12)
     assert "opening_angle" not in loadmat(out / "campaign.mat")
+    # Inputs also by the name that analyse and the report have for them.
+    export(file, "--variables", "cables.lower_winch_stop_time", "--out", file.parent / "own")
+    table = pd.read_csv(file.parent / "own" / "campaign-sample.csv")
+    assert list(table) == ["sample", "cables_lower_winch_stop_time (s)"]
     told = export(file, "--variables", "asynchrony_mx", code=2)
     assert "asynchrony_mx: is no variable of this file (did you mean asynchrony" in told
     assert "says nothing to --format pvd" in export(

@@ -65,7 +65,7 @@ def test_lock_order_counts_ties_by_halves_and_what_stays_open() -> None:
     assert last.sum() == pytest.approx(2 / 3)
     assert never[0, 1] == pytest.approx(1 / 3)
     assert never.sum() == pytest.approx(1 / 3)
-    assert "all V-joints lock in 2" in words(lock_order(campaign))
+    assert "all V-joints come to 180 deg in 2 samples" in words(lock_order(campaign))
 
 
 def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:

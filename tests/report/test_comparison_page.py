@@ -14,7 +14,7 @@ from ringsim.analysis.comparison_text import compared, names_of, sections
 from ringsim.analysis.intervals import good
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.plots.comparison import courses, figures_of_both, pairs, values
+from ringsim.plots.comparison import figures_of_both, pairs, values
 from ringsim.report.comparison import page
 from ringsim.report.shell import LARGEST
 
@@ -43,7 +43,8 @@ def test_the_page_holds_every_cell_of_the_terminal_and_loads_nothing(
     cells = [c for s in sections(found).values() for t in s.tables for r in t.rows for c in r]
     assert sorted(cells) == sorted(c for c in read.cells if c in cells)
     assert {"figure-differences", "figure-values", "figure-courses"} <= set(read.ids)
-    assert "What differs: Soft &lt;rods&gt; against Made by hand" in text
+    assert "What differs: flight against ground" in text
+    assert "Soft &lt;rods&gt; (flight)" in text
     assert text.index('id="requirements"') < text.index('id="figures"') < text.index('id="outputs"')
 
 
@@ -113,8 +114,11 @@ def test_figures_draw_the_samples_of_both(both: tuple[xr.Dataset, xr.Dataset]) -
     ordered = np.sort(both[1]["asynchrony_max"].to_numpy()[good(both[1])])
     assert second.get_xdata()[1:] == pytest.approx(ordered)
     assert second.get_ydata()[-1] == 1.0
-    figure = courses(found, both, ["asynchrony"])
-    first, second = figure.axes[0].lines
+    drawn = {name: figure for name, _, figure in figures_of_both(found, *both)}
+    labels = [" ".join(a.get_ylabel().split()) for a in drawn["courses"].axes]
+    (place,) = (k for k, each in enumerate(labels) if "difference of opening angles" in each)
+    axes = drawn["courses"].axes[place]
+    first, second = axes.lines
     for line, each in ((first, both[0]), (second, both[1])):
         rows = each["asynchrony"].to_numpy()[good(each)]
         known = np.isfinite(rows).any(axis=0)

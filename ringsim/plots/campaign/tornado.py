@@ -288,6 +288,8 @@ def _row(
 _MOST_NAMED = 72
 """Moves up to which each has its name on the axis."""
 _WIDEST = 26
+_LEAST_SPAN = 0.02
+"""Of its largest value: axes of smaller ranges are made to span twice as much."""
 
 
 def is_one_by_one(campaign: xr.Dataset) -> bool:
@@ -375,6 +377,10 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
             colour, marker = looks[word]
             axes.scatter(at[own], values[own], s=22, color=colour, marker=marker, zorder=3,
                          label=f"{word} ({(ends == word).sum()})")  # fmt: skip
+        # Moves that change next to nothing must not look as if they changed much.
+        middle, least = np.mean(values), _LEAST_SPAN * np.abs(values).max(initial=0.0)
+        if np.ptp(values) < least:
+            axes.set_ylim(middle - least, middle + least)
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         says = campaign[name].attrs
