@@ -46,6 +46,16 @@ def _scenes(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
     return found or [CompletionItem(begun, type="file")]
 
 
+def _paths(_context: Any, _option: Any, begun: str) -> list[CompletionItem]:
+    """Paths of scenes as far as the next dot; a key that takes a value ends with "="."""
+    from ringsim.reference import tree  # reads every record of the package
+
+    every, depth = tree.paths("scene"), begun.count(".") + 1
+    found = dict.fromkeys(".".join(p.split(".")[:depth]) for p in every if p.startswith(begun))
+    inner = {path.rpartition(".")[0] for path in every}
+    return [CompletionItem(name if name in inner else f"{name}=") for name in found]
+
+
 PLOT_FORMATS = ("png", "svg", "pdf")
 PLOT_FORMAT = click.option(
     "--plot-format", "formats", metavar="png,svg,pdf", callback=_formats,
@@ -63,6 +73,7 @@ SCENE = click.argument("scene", metavar="SCENE", shell_complete=_scenes)
 FOLDER = click.argument("folder", type=PATH)
 SETTINGS = click.option(
     "--set", "settings", metavar="PATH=VALUE", multiple=True, callback=_assigned,
+    shell_complete=_paths,
     help="Replace a value, e.g. loads.force=0.02, rods.young_modulus[3]=1e11, net=none.",
 )  # fmt: skip
 """Gives values by scene path."""

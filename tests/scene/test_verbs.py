@@ -5,11 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 from loops import for_each
 
-from ringsim.cli import cli
+from ringsim.cli import cli, command_of
 from ringsim.scene import builtin_scenes, load_scene
 
 
@@ -145,3 +146,15 @@ def test_an_output_that_takes_nothing_costs_no_result(
     assert told in done.stderr
     assert "Traceback" not in done.stderr
     assert (tmp_path / "run.nc").exists()
+
+
+@pytest.mark.quick
+def test_a_shell_completes_paths_after_set() -> None:
+    def offered(begun: str) -> list[str]:
+        option = next(each for each in command_of("run").params if each.name == "settings")
+        return [item.value for item in option.shell_complete(click.Context(cli), begun)]
+
+    assert "solver.step=" in offered("solver.")
+    assert offered("cables.upper.wi") == ["cables.upper.winch"]
+    assert offered("rods.you") == ["rods.young_modulus="]
+    assert offered("nothing") == []
