@@ -463,6 +463,8 @@ MERGED = "campaign.nc"
 
 
 _NOT_RUN = -1
+_MOST_ENTRIES = 10**9
+"""Of a dimension: a file may claim to have more, and memory would be asked for all of them."""
 
 
 def _require_codes(found: xr.Dataset, file: Path) -> None:
@@ -504,6 +506,12 @@ def open_stored(path: Path) -> xr.Dataset:
             raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
     try:
         found = xr.open_dataset(file, engine="netcdf4")
+        if (most := max(found.sizes.values(), default=0)) > _MOST_ENTRIES:
+            found.close()
+            raise InputError(
+                f"{file}: a dimension has {most:,} entries, must be at most {_MOST_ENTRIES:,}: the "
+                "file is damaged, or none of ringsim's: merge the campaign, or run the scene, again"
+            )
         for variable in found.variables.values():
             if len(variable.dims) < 2:
                 variable.load()

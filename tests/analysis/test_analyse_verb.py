@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -130,6 +131,13 @@ def test_a_gate_needs_requirements(tmp_path):
         analyse(tmp_path / "campaign.nc", "--gate")
 
 
+def claiming(file, count):
+    """A small file with a dimension of so many samples, none of them written."""
+    with netCDF4.Dataset(file, "w") as made:
+        made.createDimension("sample", count)
+        made.createVariable("status", "i1", ("sample",), chunksizes=(1000,))
+
+
 @for_each(
     ("make", "words"),
     [
@@ -150,6 +158,7 @@ def test_a_gate_needs_requirements(tmp_path):
             lambda folder: campaign(np.arange(9.0), status=[77] * 9).to_netcdf(folder),
             "status holds 77, which means nothing",
         ),
+        (lambda folder: claiming(folder, 10**12), "has 1,000,000,000,000 entries, must be at most"),
     ],
 )
 def test_what_is_no_campaign_is_refused(make, words, tmp_path):
