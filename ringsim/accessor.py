@@ -21,6 +21,8 @@ class Figures(dict[str, "Figure"]):
 
     def __repr__(self) -> str:
         """Their names, and what to do with one."""
+        if not self:
+            return "no figures: nothing that they show is recorded"
         return f'figures: {", ".join(self)}: figures["NAME"].savefig("NAME.png")'
 
     def _repr_html_(self) -> str:

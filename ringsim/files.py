@@ -111,7 +111,7 @@ def writing(path: Path, cure: str = "make room or choose another folder") -> Ite
         raise InputError(f"{path}: cannot be written: {reason}{_short(path)}; {cure}") from error
 
 
-_LITTLE_LEFT = 1e9
+_LITTLE_LEFT = 100e6
 
 
 def _short(path: Path) -> str:
@@ -121,10 +121,11 @@ def _short(path: Path) -> str:
     told = ""
     with contextlib.suppress(OSError):
         folder = next(each for each in (path, *path.absolute().parents) if each.is_dir())
-        if (free := shutil.disk_usage(folder).free) < _LITTLE_LEFT:
-            told += f", {size_text(free)} are left on this disk"
+        disk = shutil.disk_usage(folder)
+        if disk.total and disk.free < _LITTLE_LEFT:
+            told += f", {size_text(disk.free)} are left on this disk"
     most = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
-    if most != resource.RLIM_INFINITY:
+    if 0 <= most < _LITTLE_LEFT:
         told += f", files may have {size_text(most)} here (ulimit -f)"
     return told
 

@@ -10,7 +10,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
-from ringsim.analysis.design import LOST, Placement, called, endings, placement, population_of
+from ringsim.analysis.design import (
+    LOST,
+    Placement,
+    called,
+    endings,
+    inputs,
+    paths_of,
+    placement,
+    population_of,
+)
 from ringsim.analysis.intervals import (
     NONE,
     Mask,
@@ -207,7 +216,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
         attrs={
             "first": str(one.attrs.get("title", "")), "second": str(other.attrs.get("title", "")),
             "first_name": names[0], "second_name": names[1],
-            "pairing": pairs.told, "pairs": len(pairs.first),
+            "pairing": pairs.told, "pairs": len(pairs.first), "runs": int(single),
             "first_samples": one.sizes["sample"], "second_samples": other.sizes["sample"],
             "intervals": next(
                 (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
@@ -230,13 +239,19 @@ _SCENES_OWN = ("name", "title")
 def settings(both: Both) -> dict[str, Any]:
     """The values in which the scenes differ, as text by path: ``setting_first``, ``_second``.
 
-    A value that one of them lacks is "none".  No rows if a file does not hold its scene.
+    Their fidelities are among them.  A value that one of them lacks is "none".  No rows if a file
+    does not hold its scene.
     """
     scenes = [flat(tomllib.loads(str(each.attrs.get("scene", "")))) for each in both]
+    if all(scenes):
+        engines = [{"fidelity": str(each.attrs.get("fidelity", ""))} for each in both]
+        scenes = [engine | scene for engine, scene in zip(engines, scenes, strict=True)]
+    drawn = [{path for name in inputs(each) for path in paths_of(each[name])} for each in both]
     paths = dict.fromkeys(path for scene in scenes for path in scene) if all(scenes) else {}
     apart = [
         path for path in paths
         if path not in _SCENES_OWN and scenes[0].get(path) != scenes[1].get(path)
+        and path not in drawn[0] & drawn[1]  # then every sample has a value of its own
     ]  # fmt: skip
     found: dict[str, Any] = {"setting": ("setting", np.array(apart, dtype=object))}
     for side, scene in zip(SIDES, scenes, strict=True):

@@ -8,7 +8,7 @@ import xarray as xr
 from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section, digits_of
 from ringsim.analysis.worst import NOTE, marked
-from ringsim.tables import Table, interval_text, number_text, slim, unit_text, with_unit
+from ringsim.tables import Table, counted, interval_text, number_text, slim, unit_text, with_unit
 
 _NAMED = 20
 """Changed outcomes, and values of scenes, that are listed at most."""
@@ -28,10 +28,10 @@ def compared(found: xr.Dataset) -> list[str]:
 def head_lines(found: xr.Dataset) -> list[str]:
     """Which two, how their samples are paired, lost runs that bend it, and missing intervals."""
     pairs = ""
-    if (count := found.attrs["pairs"]) > 1:
+    if (count := found.attrs["pairs"]) and not found.attrs["runs"]:
         sizes = found.attrs["first_samples"], found.attrs["second_samples"]
         rest = "" if set(sizes) == {count} else f" of {sizes[0]} and {sizes[1]} samples"
-        pairs = f" ({count} pairs{rest})"
+        pairs = f" ({counted(count, 'pair')}{rest})"
     lines = list[str]()
     for side, name in zip(("first", "second"), names_of(found), strict=True):
         title = found.attrs[side]
@@ -80,7 +80,7 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
     """Counts and shares of the samples compared, and the difference of the shares; counts alone of
     all samples where there are no shares.
     """
-    rows, single = [], found.attrs["pairs"] == 1
+    rows, single = [], found.attrs["runs"]
     for name in found[dim].values if dim in found.dims else ():
         one = {str(n): v.values for n, v in found.sel({dim: name}).items()}
         shares, of = one[f"{word}_share"].tolist(), one[f"{word}_compared"].tolist()
@@ -104,7 +104,8 @@ def _changed(found: xr.Dataset) -> Table:
     if not pairs:
         return Table((), ())
     if not changed:
-        return Table((), (), ["no outcome differs"] if pairs > 1 else ["the outcome is the same"])
+        same = "the outcome is the same" if found.attrs["runs"] else "no outcome differs"
+        return Table((), (), [same])
     names = ("changed_sample_first", "changed_outcome_first", "changed_outcome_second")
     listed = zip(*(found[name].values[:_NAMED] for name in names), strict=True)
     rows = [(str(sample), str(first), str(second)) for sample, first, second in listed]
@@ -130,7 +131,9 @@ def _outputs(found: xr.Dataset) -> Table:
             most = found[f"{name}_largest_difference"].item()
             if all_alike(*sorted((first, second))) and all_alike(*sorted((first, first + most))):
                 value = number_text(first) if abs(first) > NOTHING else "0"
-                alike.append(f"{name} {with_unit(value, variable.units)}")
+                # Of pairs it is a mean, which need not be the value of any.
+                told = f" {with_unit(value, variable.units)}" * bool(found.attrs["runs"])
+                alike.append(f"{name}{told}")
                 continue
             largest = number_text(most)
             place = str(found[f"{name}_largest_difference_sample"].item())
@@ -144,12 +147,12 @@ def _outputs(found: xr.Dataset) -> Table:
             largest, place,
         ))  # fmt: skip
     head = (
-        "output" if found.attrs["pairs"] == 1 else "mean of", "unit", *names_of(found),
+        "output" if found.attrs["runs"] else "mean of", "unit", *names_of(found),
         "difference", "in %", "95 % interval", "worse in",
         "samples", "largest of a pair", "in sample",
     )  # fmt: skip
-    columns = 8 if found.attrs["pairs"] == 1 else len(head)
-    same = "the same in both" if found.attrs["pairs"] == 1 else "the same in each pair"
+    columns = 8 if found.attrs["runs"] else len(head)
+    same = "the same in both" if found.attrs["runs"] else "the same in each pair"
     notes = [f"{same}: {', '.join(alike)}"] * bool(alike)
     return marked(Table(head[:columns], [row[:columns] for row in rows], notes), found)
 
@@ -166,7 +169,7 @@ def _worse(found: xr.Dataset, name: str) -> str:
     of two runs by the difference itself.
     """
     ends = found[f"{name}_difference_interval"].values
-    if found.attrs["pairs"] == 1:
+    if found.attrs["runs"]:
         ends = np.full(2, found[f"{name}_difference"].item())
     ends = np.sort(quantities()[name].badness * ends)
     first, second = names_of(found)

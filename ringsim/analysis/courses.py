@@ -48,10 +48,18 @@ class Courses:
 def deployed(campaign: xr.Dataset) -> Mask:
     """Which rings came to 180 deg and stay there, as no latch missed its catch, (sample,)."""
     open_once = np.asarray(np.isfinite(campaign["deployment_time"].to_numpy()))
-    if "outcome" not in campaign:
-        return open_once
-    missed = campaign["outcome"].to_numpy() == int(Fate.NOT_LATCHED)
+    missed = np.zeros(len(open_once), dtype=bool)
+    if "outcome" in campaign:
+        missed |= campaign["outcome"].to_numpy() == int(Fate.NOT_LATCHED)
+    if {"latched_joints", "locked_joints"} <= set(campaign.data_vars):
+        # A ring may be told as overloaded, because its motors pulled on.
+        missed |= (campaign["latched_joints"] < campaign["locked_joints"]).to_numpy()
     return np.asarray(open_once & ~missed)
+
+
+def names_of_ends(campaign: xr.Dataset) -> list[str]:
+    """What ``ends`` reads of a campaign beside its times."""
+    return [n for n in ("outcome", "latched_joints", "locked_joints") if n in campaign]
 
 
 def ends(campaign: xr.Dataset) -> Array:
@@ -125,7 +133,7 @@ def _rows(campaign: xr.Dataset, at: Places) -> Iterator[tuple[Numbers, Places]]:
     and which samples they are.
     """
     time = campaign["time"].to_numpy()
-    names = [_ANGLE, "status", "deployment_time", *(n for n in ["outcome"] if n in campaign)]
+    names = [_ANGLE, "status", "deployment_time", *names_of_ends(campaign)]
     for block in blocks(campaign, names):
         block = block.isel(sample=np.flatnonzero(good(block)))
         angles = block[_ANGLE].transpose("sample", "plane", "section", "time").to_numpy()

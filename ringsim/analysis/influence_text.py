@@ -405,8 +405,10 @@ def _row_of(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ...]:
     if measure and output in analysis["output"].values:
         one = analysis.sel(output=output)
         (dim,) = one[measure].dims
-        k = one[dim].values.tolist().index(name)
-        cells = number_text(one[measure].values[k], 2), _ends(_index_ends(one, measure)[k])
+        names = one[dim].values.tolist()
+        if name in names:  # of blocks whose outputs have no index these are groups, not inputs
+            k = names.index(name)
+            cells = number_text(one[measure].values[k], 2), _ends(_index_ends(one, measure)[k])
     return name, *cells, *_correlations(analysis, output, name)
 
 

@@ -84,8 +84,9 @@ def status_lines(campaign: Folder) -> list[str]:
         longest = sorted(unfinished, key=lambda item: -item[1])[:_MOST_SHOWN]
         listed = ", ".join(f"{_named(number)} ({seconds:.0f} s)" for number, seconds in longest)
         lines.append(f"  running        {len(unfinished)}: {listed}")
-    if workers and ended[0]:
-        lines.append(f"  rate           {workers * ended[0] / max(spent[0], 1e-9):.3g} samples/s")
+    if workers and ended.any():
+        rate = workers * ended[0] / max(spent.sum(), 1e-9)
+        lines.append(f"  rate           {rate:.3g} samples/s")
         about = _left(campaign, left, spent / np.maximum(ended, 1), workers)
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     return lines
@@ -96,9 +97,15 @@ def _left(campaign: Folder, samples: int, each: NDArray[np.float64], workers: in
     seconds of one of either, 0 where none has ended.
     """
     checks = len(campaign.unchecked())
-    told = f"about {in_words((samples * each[0] + checks * each[1]) / workers)}"
-    if checks and not each[1]:
-        told += f" and {counted(checks, 'check')}, which take longer"
+    rest = [(n, seconds) for n, seconds in ((samples, each[0]), (checks, each[1])) if n]
+    known = [(n, seconds) for n, seconds in rest if seconds]
+    if not known:
+        return "not known yet" if rest else "none"
+    # No less than one of the longest: the last ones leave workers idle.
+    shared = sum(n * seconds for n, seconds in known) / workers
+    told = f"about {in_words(max(shared, *(seconds for _, seconds in known)))}"
+    if len(known) < len(rest):
+        told += f", and as long as {counted(samples if each[1] else checks, 'run')} of another kind"
     return told
 
 

@@ -74,6 +74,17 @@ class _Verbs(click.Group):
         except InputError as error:
             click.echo(str(error), err=True)
             ctx.exit(EXIT_BAD_INPUT)
+        except UnicodeEncodeError as error:
+            if sys.getfilesystemencoding() == "utf-8":
+                raise
+            # netCDF4 takes names of files as text, and this process cannot write them as such.
+            told = error.object.encode("ascii", "replace").decode("ascii")
+            click.echo(
+                f"{told}: a name of a file or folder has letters that this locale "
+                f"({sys.getfilesystemencoding()}) cannot write: set PYTHONUTF8=1, or rename it",
+                err=True,
+            )
+            ctx.exit(EXIT_BAD_INPUT)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the verbs without importing any of them."""

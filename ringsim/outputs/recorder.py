@@ -196,13 +196,13 @@ def ended(
     """The outcome of a run that ended so; ``passed`` are the limits of loads that it went over,
     ``loose`` that of slack ropes.
     """
+    unlatched = fate is Fate.NOT_LATCHED
     if not status.failed and fate is not Fate.OVERLOADED:
         fate = Fate.OVERLOADED if passed else Fate.SLACKENED if loose else fate
     passed += loose
     lost = missed(values, coordinates.get("plane", np.array([])).tolist())
     # What a ring that is not latched lacks comes before how it came to rest.
-    first = fate is Fate.NOT_LATCHED and bool(lost)
-    parts = [lost, str(reason) + passed] if first else [str(reason) + passed, lost]
+    parts = [lost, str(reason) + passed] if unlatched else [str(reason) + passed, lost]
     values["outcome"] = np.array(int(fate))
     return Outcome(status, "; ".join(filter(None, parts)), coordinates, values, reason.cause)
 

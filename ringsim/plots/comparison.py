@@ -165,6 +165,8 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
 
 def _last(dataset: xr.Dataset) -> float:
     """When the last of the runs was over, s."""
+    if "final_time" not in dataset:
+        return float(dataset["time"][-1])
     return float(np.nanmax(np.append(dataset["final_time"].to_numpy(), 0.0)))
 
 

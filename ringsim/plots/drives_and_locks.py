@@ -144,7 +144,9 @@ _SAID = {
 
 
 def least_rate(dataset: xr.Dataset) -> float:
-    """The opening rate at which latches catch, rad/s; NaN where they differ, or there are none."""
+    """The opening rate at which latches catch, rad/s; NaN where they differ, or are not known."""
+    if not dataset.attrs.get("scene"):
+        return np.nan
     latch = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene").latch
     rates = np.unique([] if latch is None else latch.min_rate)
     return float(rates[0]) if len(rates) == 1 else np.nan

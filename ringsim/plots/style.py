@@ -172,6 +172,8 @@ def deployment_time(dataset: xr.Dataset) -> float:
 def locked_time(dataset: xr.Dataset) -> float:
     """Time at which all V-joints were locked (s), NaN if a latch missed or one did not open."""
     missed = int(dataset.get("outcome", Fate.NONE)) == Fate.NOT_LATCHED
+    if "latched_joints" in dataset and "locked_joints" in dataset:
+        missed |= bool(dataset["latched_joints"] < dataset["locked_joints"])
     return math.nan if missed else deployment_time(dataset)
 
 

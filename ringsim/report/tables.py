@@ -26,7 +26,9 @@ from ringsim.variables import Cause
 MOST_FAILURES = 100
 """Rows of the table of failures; the page says how many more there are."""
 _SHOWN = ("title", "source", "execution", "seed", "solver", "identity", "date_created")
-_PLACES = re.compile(r"(?:(?:upper|lower) )?\d[\d.e+-]*(?:, )?|samples?|latches|latch")
+_PLACES = re.compile(
+    r" and \d+ more|(?:(?:upper|lower) )?\d[\d.e+-]*(?:, )?|samples?|latches|latch"
+)
 """What differs between antennas that ended alike: V-joints by name, numbers, and plurals."""
 _MOST_NAMED = 20
 """Samples of a row that are named."""
@@ -45,15 +47,18 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
     codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
     alike: dict[tuple[str, str, str], list[int]] = {}
     first: dict[tuple[str, str, str], str] = {}
+    said: dict[tuple[str, str, str], set[str]] = {}
     for place, sample in enumerate(campaign["sample"].values.tolist()):
         if words[place] not in goals:
             how = str(words[place]), causes.get(int(codes[place]), ""), str(reasons[place])
             shape = how if how[0].startswith(LOST) else (*how[:2], _PLACES.sub("", how[2]))
             first.setdefault(shape, how[2])
+            said.setdefault(shape, set()).add(how[2])
             alike.setdefault(shape, []).append(sample)
     rows = []
     for shape, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith(LOST)):
-        how = *shape[:2], first[shape]
+        mark = "" if len(said[shape]) == 1 else f"sample {samples[0]}: "
+        how = *shape[:2], mark + first[shape]
         named = ", ".join(map(str, samples[:_MOST_NAMED]))
         named += f" and {len(samples) - _MOST_NAMED} more" * (len(samples) > _MOST_NAMED)
         rows.append([named, *how, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])

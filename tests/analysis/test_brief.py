@@ -133,3 +133,17 @@ def test_a_weak_input_beside_a_strong_one_is_told_by_its_rank_correlation():
         "by its index or its partial rank correlation in fewer than one output of 10"
         in (table.notes[1])
     )
+
+
+def test_outputs_without_an_index_in_blocks_are_told_by_inputs_and_not_by_groups():
+    """A gate may bar the index of an output; its inputs then are none of the groups."""
+    found = analyse(drawn_campaign(RandomDesign(samples=60), linear, 3, 4))
+    found = found.drop_vars(["given_data_index", "given_data_index_interval", "chance_level"])
+    found = found.assign_coords(factor=["one", "two"])
+    empty = np.full((found.sizes["output"], 2), np.nan)
+    found["total_index"] = ("output", "factor"), empty
+    found["total_index_interval"] = ("output", "factor", "bound"), np.stack([empty] * 2, axis=-1)
+    found["first_order_index"] = found["total_index"]
+    found["first_order_index_interval"] = found["total_index_interval"]
+    row = what_matters(found).rows[0]
+    assert row[:3] == ("asynchrony_max", "x1", "-")

@@ -180,9 +180,12 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     checked = SimpleNamespace(unchecked=lambda: np.array([0, 5]))
     assert _left(checked, left, each, 2) == "about 34 s"
     assert _left(checked, left, np.array([4.0, 0.0]), 2) == (
-        "about 4 s and 2 checks, which take longer"
+        "about 4 s, and as long as 2 runs of another kind"
     )
     assert _left(folder, left, each, 2) == "about 4 s"
+    # The last one leaves workers idle; nothing is known before one has ended.
+    assert _left(folder, 1, np.array([100.0, 0.0]), 48) == "about 100 s"
+    assert _left(checked, left, np.zeros(2), 2) == "not known yet"
 
 
 def test_stop_signal_reaches_all_ranks(bench, mpi):

@@ -11,6 +11,7 @@ from ringsim.analysis.courses import courses, ends
 from ringsim.plots.campaign.endings import latch_rate, lock_impulse, margin
 from ringsim.plots.campaign.endings import motors as motors_of_samples
 from ringsim.plots.drives_and_locks import least_rate, locks, motors
+from ringsim.plots.style import locked_time
 from ringsim.scene import Scene
 from ringsim.variables import Fate
 
@@ -67,6 +68,7 @@ def test_the_least_rate_is_drawn_unless_it_is_drawn_by_sample(campaign: xr.Datas
     other = latched_scene().with_values({"latch.min_rate[2]": 0.3})
     assert line(campaign.assign_attrs(scene=other.to_toml())) == []
     assert np.isnan(least_rate(campaign.assign_attrs(scene=made_scene().to_toml())))
+    assert np.isnan(least_rate(campaign.drop_attrs(deep=False)))
 
 
 def test_locks_of_a_run_stand_by_section(campaign: xr.Dataset) -> None:
@@ -111,6 +113,17 @@ def test_a_ring_whose_latches_missed_is_not_over_when_it_came_to_180_degrees() -
     made["outcome"][1] = int(Fate.NOT_LATCHED)
     assert ends(made).tolist() == [4.0, 9.0, 4.0]
     assert ends(made.drop_vars("outcome")).tolist() == [4.0, 4.0, 4.0]
+    # Also of one that its motors overloaded while a latch did not catch.
+    joints = made.sizes["plane"] * made.sizes["section"]
+    count = ("sample", np.full(3, joints))
+    over = made.copy(deep=True).assign(
+        locked_joints=count, latched_joints=("sample", [joints, joints - 1, joints])
+    )
+    over["outcome"][1] = int(Fate.OVERLOADED)
+    assert ends(over).tolist() == [4.0, 9.0, 4.0]
+    run = over.isel(sample=1, drop=True)
+    assert np.isnan(locked_time(run))
+    assert motors_of_samples(made.drop_vars("outcome")).axes
     lines = {line.get_label(): line for line in motors_of_samples(made).axes[0].lines}
     assert lines["deployed (2)"].get_xdata()[-1] == 4.0
     assert lines["not latched (1)"].get_xdata()[-1] == 9.0

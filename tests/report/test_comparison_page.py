@@ -26,7 +26,7 @@ def both() -> tuple[xr.Dataset, xr.Dataset]:
     other["asynchrony_max"] = 0.9 * other["asynchrony_max"]
     other["asynchrony"] = 0.9 * other["asynchrony"]
     seeds = "sample", np.arange(8)
-    scene = made_scene().with_values({"rods.young_modulus": 60e9})
+    scene = made_scene().with_values({"stop.stiffness": 60.0})
     other.attrs["scene"], other.attrs["title"] = scene.to_toml(), "Soft <rods>"
     return one.assign(sample_seed=seeds), other.assign(sample_seed=seeds)
 
@@ -50,11 +50,9 @@ def test_the_page_holds_every_cell_of_the_terminal_and_loads_nothing(
 
 def test_what_differs_in_the_scenes_is_told_by_path(both: tuple[xr.Dataset, xr.Dataset]) -> None:
     found = compare(*both)
-    assert found["setting"].values.tolist() == ["rods.young_modulus"]
-    given = made_scene().rods.young_modulus
-    assert float(found["setting_first"].item()) == given
-    assert float(found["setting_second"].item()) == 60e9
-    assert found.sel(setting="rods.young_modulus")["setting_second"].item() == "60000000000.0"
+    assert found["setting"].values.tolist() == ["stop.stiffness"]
+    assert float(found["setting_first"].item()) == made_scene().stop.stiffness
+    assert found.sel(setting="stop.stiffness")["setting_second"].item() == "60.0"
     same = compare(both[0], both[0])
     assert same.sizes["setting"] == 0
     lines = "\n".join(compared(same))
@@ -148,7 +146,7 @@ def test_the_verb_writes_the_page_and_refuses_what_it_cannot_write(
     done = CliRunner().invoke(cli, ["compare", *paths, "--report", str(out)])
     assert done.exit_code == 0, done.output
     assert f"wrote {out} (" in done.output
-    assert "rods.young_modulus" in out.read_text(encoding="utf-8")
+    assert "stop.stiffness" in out.read_text(encoding="utf-8")
     for more, told in (
         (["--report", str(tmp_path / "page.txt")], "the page is HTML: write page.html"),
         (["--pdf"], "--pdf: says nothing without --report"),
@@ -157,3 +155,28 @@ def test_the_verb_writes_the_page_and_refuses_what_it_cannot_write(
         done = CliRunner().invoke(cli, ["compare", *paths, *more])
         assert done.exit_code == 2, done.output
         assert told in done.output
+
+
+def test_one_pair_of_many_samples_is_no_pair_of_runs(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    first, second = both[0].isel(sample=slice(0, 2)), both[1].isel(sample=slice(1, 6))
+    found = compare(first, second)
+    assert (found.attrs["pairs"], found.attrs["runs"]) == (1, 0)
+    lines = compared(found)
+    assert "samples are paired by their seeds (1 pair of 2 and 5 samples)" in lines
+    (table,) = sections(found)["outputs"].tables
+    assert "worse in" not in table.head
+    assert table.head[0] == "mean of"
+    runs = compare(*(each.isel(sample=0, drop=True) for each in both))
+    assert runs.attrs["runs"] == 1
+    assert "the outcome is the same" in "\n".join(compared(runs))
+
+
+def test_engines_and_what_is_drawn_are_told_apart(both: tuple[xr.Dataset, xr.Dataset]) -> None:
+    frame = both[0].assign_attrs(fidelity="frame")
+    found = compare(frame, both[0].assign_attrs(fidelity="full"))
+    assert found["setting"].values.tolist() == ["fidelity"]
+    drawn = {"role": "input", "path": "stop.stiffness"}
+    one, two = (each.assign(stiffness=("sample", np.arange(8.0), drawn)) for each in both)
+    assert "stop.stiffness" not in compare(one, two)["setting"].values

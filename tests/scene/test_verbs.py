@@ -1,5 +1,6 @@
 """``ringsim scenes`` and ``ringsim check``."""
 
+import os
 import re
 import subprocess
 import sys
@@ -158,3 +159,20 @@ def test_a_shell_completes_paths_after_set() -> None:
     assert offered("cables.upper.wi") == ["cables.upper.winch"]
     assert offered("rods.you") == ["rods.young_modulus="]
     assert offered("nothing") == []
+
+
+def test_names_that_a_locale_cannot_write_are_refused_with_the_cure(tmp_path: Path) -> None:
+    """netCDF4 writes names of files as text: a locale of ASCII alone cannot."""
+    folder = tmp_path / "gerät"
+    folder.mkdir()
+    locale = {"LC_ALL": "POSIX", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    (folder / "a.nc").write_bytes(b"")
+    done = subprocess.run(
+        [sys.executable, "-m", "ringsim", "analyse", folder / "a.nc"], env=os.environ | locale,
+        capture_output=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    line = done.stderr.decode("ascii", "replace")
+    assert "a name of a file or folder has letters that this locale" in line
+    assert "set PYTHONUTF8=1" in line
+    assert "Traceback" not in line

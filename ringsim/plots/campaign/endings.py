@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ringsim.analysis.courses import ends
+from ringsim.analysis.courses import ends, names_of_ends
 from ringsim.analysis.design import blocks, endings, inputs, paths_of, told, values_of
 from ringsim.analysis.intervals import good, used
 from ringsim.outputs.family import Array
@@ -186,7 +186,8 @@ def _laid(grid: Array, angle: Array, margins: Array) -> Array:
 )  # fmt: skip
 def motors(campaign: xr.Dataset) -> Figure:
     """A row a motor, from ``motor_torque`` and ``motor_speed`` (sample, plane, winch, time)."""
-    names = ["motor_torque", "motor_speed", "final_time", "deployment_time", "outcome"]
+    names = ["motor_torque", "motor_speed", "final_time", "deployment_time"]
+    names += names_of_ends(campaign)
     read, words = chosen(campaign, names)
     # Motors that have done their work stand still, and would hide those that still wind.
     read = read.where(read["time"] <= xr.DataArray(ends(read), dims="sample"))
@@ -263,7 +264,7 @@ def peaks(campaign: xr.Dataset) -> xr.DataArray:
     """Largest recorded tension of each span until the last lock, (sample, plane, span), N."""
     found = []
     names = ["cable_tension", "status", "final_time", "deployment_time"]
-    for block in blocks(campaign, [*names, *(n for n in ["outcome"] if n in campaign)]):
+    for block in blocks(campaign, [*names, *names_of_ends(campaign)]):
         own = used(block)
         until = xr.DataArray(ends(own), dims="sample")
         found.append(own["cable_tension"].where(own["time"] <= until).max("time", keep_attrs=True))

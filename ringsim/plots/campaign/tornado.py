@@ -86,9 +86,10 @@ def analysed(campaign: xr.Dataset) -> xr.Dataset:
     found = sensitivity(campaign, {}, placed, names)
     if "factor" in found.dims and all(_measure(found, name) for name in names):
         return found
+    stand = population_of(campaign)
     known = [name for name in quantities() if name in campaign]
-    counts = {f"{n}_samples": ("counted", [len(values_of(campaign, n)[0])]) for n in known}
-    return xr.merge([found, influence(population_of(campaign), {}, placed), xr.Dataset(counts)])
+    counts = {f"{n}_samples": ("counted", [len(values_of(stand, n)[0])]) for n in known}
+    return xr.merge([found, influence(stand, {}, placed), xr.Dataset(counts)])
 
 
 def _measure(analysis: xr.Dataset, output: str) -> str:
@@ -113,17 +114,17 @@ def bars_of(campaign: xr.Dataset) -> Iterator[tuple[str, Bars]]:
     """
     analysis, names = analysed(campaign), scalars(campaign)
     others = analysis["output"].values.tolist() if "output" in analysis.dims else []
+    stand = population_of(campaign)
     matter = {output: chosen for output, chosen, _ in mattering(analysis)}
     for output in [*names, *(name for name in others if name not in names)]:
         measure, told = _measure(analysis, output), ""
+        count = len(values_of(stand, output)[0])
         if output in others:
             told = _counted(analysis.sel(output=output), blocks="factor" in analysis.dims)
         if measure.endswith("rank_correlation"):
-            told = "\n".join(
-                filter(None, [f"samples: {len(values_of(campaign, output)[0])}", told])
-            )
+            told = "\n".join(filter(None, [f"samples: {count}", told]))
         if measure or told:
-            chance = _chance(analysis, measure, output, len(values_of(campaign, output)[0]))
+            chance = _chance(analysis, measure, output, count)
             yield output, _bars(analysis, measure, output, told, chance, matter.get(output, []))
 
 
