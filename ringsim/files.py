@@ -112,6 +112,7 @@ def writing(path: Path, cure: str = "make room or choose another folder") -> Ite
 
 
 _LITTLE_LEFT = 100e6
+"""Bytes: a campaign of some hundred samples; where more is left, that is hardly the cause."""
 
 
 def _short(path: Path) -> str:

@@ -72,8 +72,8 @@ def _settings(found: xr.Dataset) -> Table:
     paths, count = found["setting"].values.tolist(), found.sizes["setting"]
     columns = (found[f"setting_{side}"].values.tolist() for side in ("first", "second"))
     rows = [(str(p), str(a), str(b)) for p, a, b in zip(paths, *columns, strict=True)]
-    notes = [f"and {count - _NAMED} more, all of them in the file of --out"] * (count > _NAMED)
-    return Table(("set otherwise in the scene", *names_of(found)), rows[:_NAMED], notes, left=3)
+    notes = [f"and {count - _NAMED} more: all are in the file of --out"] * (count > _NAMED)
+    return Table(("differs in the scene", *names_of(found)), rows[:_NAMED], notes, left=3)
 
 
 def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
@@ -111,7 +111,7 @@ def _changed(found: xr.Dataset) -> Table:
     rows = [(str(sample), str(first), str(second)) for sample, first, second in listed]
     notes = [f"the outcome differs in {changed} of {pairs}"]
     if changed > _NAMED:
-        notes.append(f"listed are {_NAMED}, all of them are in the file of --out")
+        notes.append(f"{_NAMED} of them are listed, all are in the file of --out")
     return Table(("sample", *(f"in {name}" for name in names_of(found))), rows, notes, left=3)
 
 

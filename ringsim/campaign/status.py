@@ -105,7 +105,8 @@ def _left(campaign: Folder, samples: int, each: NDArray[np.float64], workers: in
     shared = sum(n * seconds for n, seconds in known) / workers
     told = f"about {in_words(max(shared, *(seconds for _, seconds in known)))}"
     if len(known) < len(rest):
-        told += f", and as long as {counted(samples if each[1] else checks, 'run')} of another kind"
+        rest_of = counted(samples, "sample") if each[1] else counted(checks, "check")
+        told += f", and {rest_of}, of which none has ended yet"
     return told
 
 

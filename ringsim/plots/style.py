@@ -328,6 +328,7 @@ def signed_sizes(axes: Axes, sizes: np.ndarray) -> None:
 
 
 _MOST_MARGIN = 1e3
+"""Beyond it next to nothing resists, and how little says nothing."""
 
 
 def margin_axis(axes: Axes, margins: np.ndarray) -> None:

@@ -180,7 +180,7 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     checked = SimpleNamespace(unchecked=lambda: np.array([0, 5]))
     assert _left(checked, left, each, 2) == "about 34 s"
     assert _left(checked, left, np.array([4.0, 0.0]), 2) == (
-        "about 4 s, and as long as 2 runs of another kind"
+        "about 4 s, and 2 checks, of which none has ended yet"
     )
     assert _left(folder, left, each, 2) == "about 4 s"
     # The last one leaves workers idle; nothing is known before one has ended.

@@ -56,7 +56,8 @@ def test_what_differs_in_the_scenes_is_told_by_path(both: tuple[xr.Dataset, xr.D
     same = compare(both[0], both[0])
     assert same.sizes["setting"] == 0
     lines = "\n".join(compared(same))
-    assert "set otherwise" not in lines
+    assert "differs in the scene" not in lines
+    assert "differs in the scene" in "\n".join(compared(found))
     assert "no outcome differs" in lines
     # A part that one of them lacks.
     held = made_scene().with_values(
