@@ -41,7 +41,11 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     """Load a public word on its first use."""
     if name == "__version__":
-        return importlib.import_module("importlib.metadata").version(__name__)
+        metadata = importlib.import_module("importlib.metadata")
+        try:
+            return metadata.version(__name__)
+        except metadata.PackageNotFoundError:  # run from its sources, without an installation
+            return "unknown"
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     word = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -14,8 +14,10 @@ from ringsim.analysis.design import (
     LOST,
     Placement,
     called,
+    distribution_of,
     endings,
     inputs,
+    law_text,
     paths_of,
     placement,
     population_of,
@@ -239,8 +241,8 @@ _SCENES_OWN = ("name", "title")
 def settings(both: Both) -> dict[str, Any]:
     """The values in which the scenes differ, as text by path: ``setting_first``, ``_second``.
 
-    Their fidelities are among them.  A value that one of them lacks is "none".  No rows if a file
-    does not hold its scene.
+    Fidelities are among them, and behind them the distributions and requirements of campaigns.
+    A value that one of them lacks is "none".  No values if a file does not hold its scene.
     """
     scenes = [flat(tomllib.loads(str(each.attrs.get("scene", "")))) for each in both]
     if all(scenes):
@@ -253,12 +255,31 @@ def settings(both: Both) -> dict[str, Any]:
         if path not in _SCENES_OWN and scenes[0].get(path) != scenes[1].get(path)
         and path not in drawn[0] & drawn[1]  # then every sample has a value of its own
     ]  # fmt: skip
-    found: dict[str, Any] = {"setting": ("setting", np.array(apart, dtype=object))}
-    for side, scene in zip(SIDES, scenes, strict=True):
+    asked = [_asked(each) for each in both]
+    other = [
+        name for name in dict.fromkeys([*asked[0], *asked[1]])
+        if asked[0].get(name) != asked[1].get(name)
+    ]  # fmt: skip
+    names = np.array(apart + other, dtype=object)
+    found: dict[str, Any] = {"setting": ("setting", names)}
+    for side, scene, words in zip(SIDES, scenes, asked, strict=True):
         told = [show(scene[path]) if path in scene else "none" for path in apart]
-        words = {"long_name": f"value in the scene of the {side}"}
-        found[f"setting_{side}"] = "setting", np.array(told, dtype=object), words
+        told += [words.get(name, "none") for name in other]
+        about_it = {"long_name": f"value in the {side}"}
+        found[f"setting_{side}"] = "setting", np.array(told, dtype=object), about_it
     return found
+
+
+def _asked(campaign: xr.Dataset) -> dict[str, str]:
+    """Distributions and requirements of a campaign in words, by name."""
+    drawn = (campaign[name] for name in inputs(campaign))
+    laws = {f"input {called(each)}": law_text(distribution_of(each)) for each in drawn}
+    wanted = required_by(campaign.attrs)
+    return laws | {
+        f"requirement {name}": f"{each.told(name).removeprefix(name).strip()}, probability "
+        f"{each.probability:g}, confidence {each.confidence:g}"
+        for name, each in wanted.items()
+    }
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:

@@ -51,7 +51,7 @@ def names_of(found: xr.Dataset) -> tuple[str, str]:
 def sections(found: xr.Dataset) -> dict[str, Section]:
     """All that a comparison tells, by name, parts without rows and notes left out."""
     parts = (
-        Section("settings", "What differs in the scenes", [_settings(found)]),
+        Section("settings", "What differs in what was asked", [_settings(found)]),
         Section("outcomes", "Outcomes", [
             _shares(found, "kind", "kind", "outcome"), _changed(found)
         ]),
@@ -68,12 +68,12 @@ def sections(found: xr.Dataset) -> dict[str, Section]:
 
 
 def _settings(found: xr.Dataset) -> Table:
-    """The values in which the two scenes differ."""
+    """The values, distributions and requirements in which the two differ."""
     paths, count = found["setting"].values.tolist(), found.sizes["setting"]
     columns = (found[f"setting_{side}"].values.tolist() for side in ("first", "second"))
     rows = [(str(p), str(a), str(b)) for p, a, b in zip(paths, *columns, strict=True)]
     notes = [f"and {count - _NAMED} more: all are in the file of --out"] * (count > _NAMED)
-    return Table(("differs in the scene", *names_of(found)), rows[:_NAMED], notes, left=3)
+    return Table(("differs in", *names_of(found)), rows[:_NAMED], notes, left=3)
 
 
 def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:

@@ -18,11 +18,12 @@ from ringsim.analysis import intervals
 from ringsim.analysis.intervals import NONE, Interval, good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
 from ringsim.outputs import VARIABLES
-from ringsim.refusal import InputError
+from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import BLOCK_ROW
 from ringsim.sampling.designs.blocks import Grouped, stretches
 from ringsim.sampling.designs.family import Design
 from ringsim.stepping.instant import Array
+from ringsim.tables import number_text
 from ringsim.variables import GOALS, Cause, Code, Fate, Status
 
 # The blocks of runs that designs for Sobol' indices and for screening are made of.
@@ -326,6 +327,22 @@ def distribution_of(variable: xr.DataArray) -> dict[str, Any]:
     except ValueError:
         found = None
     return found if isinstance(found, dict) else {"text": text}
+
+
+def law_text(says: Mapping[str, Any]) -> str:
+    """A distribution in words: its kind, and its parameters without those that place it.
+
+    >>> law_text({"kind": "uniform", "each_section": False, "low": 0.7, "high": 1.0})
+    'uniform, low 0.7, high 1'
+    """
+    own = {key: value for key, value in says.items() if key not in ("shared", "each_section")}
+    kind = str(own.pop("kind", own.pop("text", "")))
+    parts = (
+        f"{key.replace('_', ' ')} "
+        f"{number_text(value, 5) if isinstance(value, float) else show(value)}"
+        for key, value in own.items()
+    )
+    return ", ".join([kind, *parts])
 
 
 # The drawn inputs of a campaign as columns of numbers: by mean, quarter, place, and by word.

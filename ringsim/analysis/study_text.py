@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.design import placement, population_of
+from ringsim.analysis.design import law_text, placement, population_of
 from ringsim.analysis.influence_text import (
     influence_tables,
     refusals,
@@ -37,7 +37,6 @@ from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
 from ringsim.analysis.worst import MARK, NOTE, losses, marked, worst_lines, worst_tables
 from ringsim.refusal import InputError
-from ringsim.sampling.distributions import label_of
 from ringsim.tables import (
     Table,
     counted,
@@ -61,7 +60,7 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
         return []
     bent = MARK * bool(analysis.attrs.get(NOTE))
     laws = json.loads(analysis["reweighted_to"].item())
-    law_words = ", ".join(f"{path} = {label_of(law)}" for path, law in laws.items())
+    law_words = "; ".join(f"{path} {law_text(law)}" for path, law in laws.items())
     first = Table((), (), [
         f"reweighted to {law_words}: {analysis['reweighted_samples'].item()} samples count as "
         f"{number_text(analysis['effective_samples'].item(), 3)} effective ones"

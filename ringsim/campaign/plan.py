@@ -30,11 +30,12 @@ _STRONG = 0.5
 """Rank correlation of two inputs that is told before anything runs."""
 
 
-def plan(order: Order, workers: int) -> list[str]:
+def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: None) -> list[str]:
     """The plan as text; InputError if the folder, which need not exist, is another campaign's.
 
     The cost is predicted from samples that are done; if there are none, one sample of middling
     cost runs as a trial, and nothing of it is kept.  So is that of checks by the judging engine.
+    ``say`` is told before a trial begins, which may take minutes.
     """
     order.check()
     campaign, share = grown(order.campaign, order.folder), order.share
@@ -67,7 +68,7 @@ def plan(order: Order, workers: int) -> list[str]:
         lines.append(f"  looks          {looks} (stop_when)")
     judged = survey(order.folder, run_with, checks=True)
     runs = sum(int(np.isfinite(each.seconds).sum()) for each in (found, judged))
-    each, told, size = _predicted(order, table, found, todo, lambda sample: sample, runs)
+    each, told, size = _predicted(order, table, found, todo, lambda sample: sample, runs, say)
     lines += [f"  cost           {words}" for words in told]
     if len(each):
         every = campaign.specification.check_every
@@ -89,7 +90,7 @@ def plan(order: Order, workers: int) -> list[str]:
             f"  checks         {len(checked)} samples with the full engine, too, {len(open_)} to "
             "run here"
         )
-        own, told, _ = _predicted(order, table, judged, open_, check_of, runs)
+        own, told, _ = _predicted(order, table, judged, open_, check_of, runs, say)
         lines += [f"  cost of checks {words}" for words in told]
         each = np.concatenate([each, own])
     if not len(each):
@@ -107,6 +108,7 @@ def _predicted(
     todo: Samples,
     number: Callable[[int], int],
     runs: int,
+    say: Callable[[str], None],
 ) -> tuple[Array, list[str], float]:
     """Time of each run (s), that in words, and bytes that a run takes in the journals; ``number``
     is that of a sample's run, ``runs`` are those that the journals hold.
@@ -129,6 +131,8 @@ def _predicted(
             allowance=campaign.specification.limits, keep=kept.append, judge=order.judge,
             stop=lambda: "long enough" if kept and kept[0].seconds > _SHORT else "",
         )  # fmt: skip
+        check = "" if number(trial) == trial else "the check of "
+        say(f"a trial run of {check}sample {trial}, to tell the cost ...")
         # A process's first run loads code: a short one is repeated.
         Local(1).run([number(trial)] * 2, work)
         result = kept[-1]

@@ -1,5 +1,6 @@
 """``ringsim campaign`` and ``status``."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +82,8 @@ def campaign_command(
         draw_figures(found, folder, "campaign", formats)
 
     if dry_run:
-        for line in plan(order(), max(1, workers or launched_size())):
+        say = partial(click.echo, err=True)
+        for line in plan(order(), max(1, workers or launched_size()), say):
             click.echo(line)
         return EXIT_DONE
     ended = start(workers, order, draw)

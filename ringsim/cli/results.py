@@ -121,7 +121,7 @@ def analyse_command(
         click.echo(line)
     _save(found, out)
     if gate and (failing := not_met(found)):
-        click.echo(f"gate closed: {'; '.join(failing)}", err=True)
+        click.echo(f"{source}: gate closed: {'; '.join(failing)}", err=True)
         return EXIT_NOT_MET
     return EXIT_DONE
 

@@ -35,6 +35,8 @@ the motion under a constant force, number of steps over the step or its toleranc
 
 _ANCF = 2.7
 """Time of a run with rods of kind "ancf" over that of "geometrically-exact"."""
+_ERROR_BARS = 3.3
+"""Time of a run with error bars, which runs again with half the steps, over that without."""
 _T = TypeVar("_T")
 
 
@@ -113,6 +115,8 @@ def relative_cost(table: Table, base: Scene) -> Array:
         values = column.values.reshape(table.samples, -1)
         if path == "rods.kind":
             cost *= np.where(values[:, 0] == "ancf", _ANCF, 1.0)
+        elif path == "solver.error_bars":
+            cost *= np.where(values[:, 0].astype(bool), _ERROR_BARS, 1.0)
         elif path in _EXPONENTS and path != f"solver.{unused}" and not column.in_words:
             size = np.abs(values.astype(float)).mean(axis=1)
             cost *= np.maximum(size, 1e-12) ** _EXPONENTS[path]  # no force, no division by it

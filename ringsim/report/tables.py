@@ -4,7 +4,6 @@ import re
 import shlex
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any
 
 import xarray as xr
 
@@ -17,9 +16,9 @@ from ringsim.analysis.design import (
     distribution_of,
     endings,
     inputs,
+    law_text,
     paths_of,
 )
-from ringsim.refusal import show
 from ringsim.tables import number_text
 from ringsim.variables import Cause
 
@@ -72,11 +71,7 @@ def drawn(campaign: xr.Dataset) -> Rows:
     rows = []
     for name in inputs(campaign):
         variable = campaign[name]
-        says, values = distribution_of(variable), variable.to_numpy()
-        says.pop("shared", None)
-        says.pop("each_section", None)
-        kind = says.pop("kind", says.pop("text", ""))
-        law = ", ".join([kind, *(f"{key} {_short(value)}" for key, value in says.items())])
+        law, values = law_text(distribution_of(variable)), variable.to_numpy()
         if values.dtype.kind in "OU":
             counts = Counter(values.ravel().astype(str).tolist()).most_common(6)
             extent = ", ".join(f"{word} ({n})" for word, n in counts)
@@ -87,10 +82,6 @@ def drawn(campaign: xr.Dataset) -> Rows:
         paths = ", ".join(paths_of(variable))
         rows.append([called(variable), unit, str(places), law, extent, paths])
     return rows
-
-
-def _short(value: Any) -> str:
-    return number_text(value, 5) if isinstance(value, float) else show(value)
 
 
 def provenance(campaign: xr.Dataset) -> Iterator[tuple[str, str]]:

@@ -122,7 +122,8 @@ def test_the_gate_is_closed_while_samples_are_left(tmp_path):
     campaign(np.arange(20.0), status=status).to_netcdf(tmp_path / "campaign.nc")
     words = "--require", "asynchrony_max: max 100 deg, probability 0.5, confidence 0.5"
     told = ringsim("analyse", tmp_path / "campaign.nc", "--gate", *words)
-    assert (told.returncode, told.stderr) == (4, "gate closed: 8 of 20 samples have not run\n")
+    words = f"{tmp_path / 'campaign.nc'}: gate closed: 8 of 20 samples have not run\n"
+    assert (told.returncode, told.stderr) == (4, words)
 
 
 def test_a_gate_needs_requirements(tmp_path):

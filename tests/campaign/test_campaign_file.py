@@ -216,6 +216,21 @@ def test_long_runs_come_first(tmp_path):
     assert longest_first(np.array([4, 2, 9]), np.ones(10)) == [4, 2, 9]
 
 
+@pytest.mark.quick
+def test_samples_with_error_bars_cost_more_and_are_no_trial(tmp_path):
+    """A run with error bars has a second one of half the steps: it foretells no other sample."""
+    text = "error_bars_every = 4\n" + GOOD
+    campaign = loaded(tmp_path, text.replace("samples = 4", "samples = 8"))
+    table = campaign.draw()
+    cost = relative_cost(table, campaign.scene)
+    barred = next(c.values for c in table.columns if c.path == "solver.error_bars").astype(bool)
+    assert barred.tolist() == [True, False, False, False] * 2
+    without = loaded(tmp_path, GOOD.replace("samples = 4", "samples = 8")).draw()
+    plain = relative_cost(without, campaign.scene)
+    np.testing.assert_allclose(cost / plain, np.where(barred, 3.3, 1.0) * (cost / plain)[1])
+    assert not barred[np.argsort(cost)[4]]
+
+
 @pytest.mark.skipif(shutil.which("ncdump") is None, reason="there is no ncdump")
 def test_file_opens_in_ncdump(bench):
     bench.run("campaign", bench.write(2), "--workers", 0, "--out", "out")

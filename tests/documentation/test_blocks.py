@@ -75,9 +75,59 @@ def test_links_lead_to_files(page: Path) -> None:
 
 @pytest.mark.parametrize("page", SCRIPTS, ids=lambda path: path.stem)
 def test_python_of_a_page_runs(page: Path, tmp_path: Path) -> None:
-    script = "\n".join(blocks(page, "python"))
-    (tmp_path / "script.py").write_text(script, encoding="utf-8")
-    run([sys.executable, "-W", "error", "script.py"], tmp_path)
+    script(page, tmp_path, "\n".join(blocks(page, "python")))
+
+
+@pytest.mark.parametrize(
+    "page",
+    [ROOT / "README.md", ROOT / "docs" / "guide" / "commands.md", ROOT / "docs/howto/go_on.md"],
+    ids=lambda path: path.stem,
+)
+def test_python_of_a_page_runs_in_the_full_model(page: Path, tmp_path: Path) -> None:
+    """On a small ring; a state to go on from is the frame engine's alone, and refused with that."""
+    text = "\n".join(blocks(page, "python"))
+    assert 'fidelity="frame"' in text
+    smaller = '"structure.sections": 3, "solver.end_time": 0.3, "loads.force"'
+    full = text.replace('fidelity="frame"', 'fidelity="full"').replace('"loads.force"', smaller)
+    full = full.replace('simulate("ring18"', 'simulate("truss2"')
+    if page.stem == "go_on":
+        found = script(page, tmp_path, full, code=1)
+        assert "choose fidelity" in found
+    else:
+        script(page, tmp_path, full + "\nassert dataset.status.item() == 0, dataset.reason")
+
+
+def test_the_laws_of_ones_own_run_in_both_engines(tmp_path: Path) -> None:
+    """Each listing of that page with a run: same angles at the end, and what the law changes."""
+    friction, stribeck, fault = blocks(ROOT / "docs" / "howto" / "own_structure.md", "python")
+    compare = """
+import numpy as np, ringsim
+both = [ringsim.simulate(scene.with_values({"solver.end_time": END}), fidelity=name)
+        for name in ("full", "frame")]
+assert [run.status.item() for run in both] == [0, 0], [run.reason for run in both]
+angles = [run.opening_angle.dropna("time").values[..., -1] for run in both]
+moved = angles[0] - both[0].opening_angle.values[..., 0]
+assert np.abs(moved).min() > 0.1, moved
+assert np.abs(angles[0] - angles[1]).max() < 2e-3 * np.abs(moved).max(), angles
+"""
+    struck = """
+ring = {"structure.sections": 3, "net": "none", "structure.opening_angle": 150.0}
+ring["hinge_spring"] = {"kind": "linear", "stiffness": 0.02, "preload": 0.01}
+ring["faults"] = [{"kind": "failed-section", "section": 2, "time": 0.01}]
+import ringsim
+scene = ringsim.load_scene("ring18").with_values(ring)
+"""
+    for text, end in (friction, 2.0), (stribeck, 2.0), (fault + struck, 0.3):
+        script(Path("own_structure"), tmp_path, text + compare.replace("END", str(end)))
+
+
+def script(page: Path, folder: Path, text: str, *, code: int = 0) -> str:
+    """What the text of ``page`` has printed as a script that treats warnings as errors."""
+    (folder / f"{page.stem}.py").write_text(text, encoding="utf-8")
+    command = [sys.executable, "-W", "error", f"{page.stem}.py"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
 
 
 def run(command: list[str], folder: Path) -> str:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -56,8 +59,8 @@ def test_what_differs_in_the_scenes_is_told_by_path(both: tuple[xr.Dataset, xr.D
     same = compare(both[0], both[0])
     assert same.sizes["setting"] == 0
     lines = "\n".join(compared(same))
-    assert "differs in the scene" not in lines
-    assert "differs in the scene" in "\n".join(compared(found))
+    assert "differs in" not in lines
+    assert "differs in" in "\n".join(compared(found))
     assert "no outcome differs" in lines
     # A part that one of them lacks.
     held = made_scene().with_values(
@@ -181,3 +184,29 @@ def test_engines_and_what_is_drawn_are_told_apart(both: tuple[xr.Dataset, xr.Dat
     drawn = {"role": "input", "path": "stop.stiffness"}
     one, two = (each.assign(stiffness=("sample", np.arange(8.0), drawn)) for each in both)
     assert "stop.stiffness" not in compare(one, two)["setting"].values
+
+
+def test_distributions_and_requirements_that_differ_are_told(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    def asked(campaign: xr.Dataset, high: float, limit: float | None) -> xr.Dataset:
+        law = json.dumps(
+            {"kind": "uniform", "each_section": False, "shared": [], "low": 40.0, "high": high}
+        )
+        about = {"role": "input", "path": "stop.stiffness", "distribution": law}
+        wanted = {"max": limit, "probability": 0.9, "confidence": 0.95}
+        text = json.dumps({"asynchrony_max": wanted} if limit else {})
+        drawn = campaign.assign(stiffness=("sample", np.arange(8.0), about))
+        return drawn.assign_attrs(requirements=text)
+
+    one, two = asked(both[0], 60.0, 5.0), asked(both[1], 80.0, None)
+    lines = "\n".join(compared(compare(one, two)))
+    assert re.search(
+        r"input stop.stiffness +uniform, low 40, high 60 +uniform, low 40, high 80", lines
+    )
+    assert re.search(
+        r"requirement asynchrony_max +<= 5 degree, probability 0.9, confidence 0.95 +none", lines
+    )
+    assert "input stop.stiffness" not in "\n".join(
+        compared(compare(one, asked(both[1], 60.0, 4.0)))
+    )
