@@ -22,6 +22,7 @@ from ringsim.plots import style
 from ringsim.plots.campaign import endings
 from ringsim.plots.campaign.courses import lock_order, shares
 from ringsim.plots.campaign.endings import base_load, margin, motors, tension
+from ringsim.plots.campaign.frame import shown
 from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
 from ringsim.plots.campaign.tornado import moves, named, one_by_one
 from ringsim.plots.figures import PICTURES, draw_figures, figures_of
@@ -307,3 +308,35 @@ def test_one_at_a_time_names_every_change() -> None:
     names = {picture.name for picture, _ in figures_of(campaign)}
     assert "one_by_one" in names
     assert not {"distributions", "convergence"} & names
+
+
+def test_panels_are_for_numbers_that_differ_or_have_limits() -> None:
+    """Fewer than a thousandth apart is no panel; whole numbers have one where they are required."""
+    campaign = made_campaign(8)
+    campaign.attrs["requirements"] = "{}"
+    campaign["deployment_time"] = "sample", np.linspace(10.0, 10.02, 8)
+    names, flat = shown(campaign)
+    assert "deployment_time" in names
+    assert "deployment_time" not in flat
+    campaign["deployment_time"] = "sample", np.linspace(10.0, 10.005, 8)
+    names, flat = shown(campaign)
+    assert "deployment_time" not in names
+    assert "same in all samples within 0.1 %: deployment_time" in flat
+    assert "within 0.1 %: deployment_time" in words(distributions(campaign))
+    assert "within 0.1 %: deployment_time" in words(convergence(campaign))
+    wanted = {"probability": 0.9, "confidence": 0.9}
+    campaign["latched_joints"] = "sample", np.full(8, 6)
+    campaign.attrs["requirements"] = json.dumps(
+        {"deployment_time": {"max": 12.0} | wanted, "latched_joints": {"min": 6} | wanted}
+    )
+    names, flat = shown(campaign)
+    assert {"deployment_time", "latched_joints"} <= set(names)
+    assert "deployment_time" not in flat
+
+
+def test_settings_of_the_solver_are_no_inputs_beside_the_antenna_s() -> None:
+    campaign = made_campaign(3)
+    panels = len(by_input(campaign).axes)
+    about = {"role": "input", "path": "solver.error_bars", "distribution": "one sample in 2"}
+    campaign["solver_error_bars"] = "sample", np.array([True, False, True]), about
+    assert len(by_input(campaign).axes) == panels

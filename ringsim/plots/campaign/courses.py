@@ -173,7 +173,7 @@ def shares(campaign: xr.Dataset) -> tuple[Array, Array, Array]:
     ("lock_time",),
 )  # fmt: skip
 def lock_order(campaign: xr.Dataset) -> Figure:
-    """Bars by plane and section from ``lock_time`` (sample, plane, section)."""
+    """Bars by plane and section from ``lock_time`` (sample, plane, section), on one another."""
     sections, planes = campaign["section"].values, campaign["plane"].values.tolist()
     figure = Figure(
         figsize=(float(np.clip(0.42 * len(sections) + 2.0, 6.4, 11.0)), 1.9 * len(planes) + 1.4)
@@ -184,12 +184,12 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     drawn = [
         (look, table) for look, table in zip(looks, shares(campaign), strict=True) if table.any()
     ]
-    width = 0.8 / max(len(drawn), 1)
     for row, (plane, axes) in enumerate(zip(planes, grid, strict=True)):
-        for place, ((label, colour, hatch), table) in enumerate(drawn):
-            at = sections + width * (place - 0.5 * (len(drawn) - 1))
-            axes.bar(at, table[row], width, color=colour, hatch=hatch, edgecolor="white",
-                     linewidth=0.3, label=label)  # fmt: skip
+        below = np.zeros(len(sections))
+        for (label, colour, hatch), table in drawn:
+            axes.bar(sections, table[row], 0.6, below, color=colour, hatch=hatch,
+                     edgecolor="white", linewidth=0.3, label=label)  # fmt: skip
+            below += table[row]
         axes.set_title(f"{plane} plane", fontsize=9.5)
         axes.grid(visible=False, axis="x")
     grid[0].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import QUANTILES
-from ringsim.analysis.design import population_of
+from ringsim.analysis.design import population_of, scalars, values_of
+from ringsim.analysis.intervals import quantities
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import losses
 from ringsim.plots import style
@@ -69,6 +70,34 @@ def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
     """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
     wanted = required_by(campaign.attrs)
     return wanted[name].limits if name in wanted else []
+
+
+_APART = 1e-3
+"""Range of a number over its size below which a panel of its own shows nothing: no digit of it that
+tables give changes."""
+
+
+def shown(campaign: xr.Dataset) -> tuple[list[str], str]:
+    """Main numbers that differ between samples or have limits, and a word on those that do not.
+
+    All of them if none differs.
+    """
+    limited = required_by(campaign.attrs)
+    names = scalars(campaign)
+    names += [
+        name for name in limited
+        if name in campaign and name in quantities() and name not in names
+        and len(values_of(campaign, name)[1])
+    ]  # fmt: skip
+    known = {name: values_of(campaign, name)[1] for name in names}
+    flat = [
+        name for name, values in known.items()
+        if name not in limited and np.ptp(values) < _APART * np.abs(values).max()
+    ]  # fmt: skip
+    if not flat or len(flat) == len(names):
+        return names, ""
+    rest = [name for name in names if name not in flat]
+    return rest, f" The same in all samples within {100 * _APART:g} %: {', '.join(flat)}."
 
 
 def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:

@@ -28,7 +28,16 @@ from ringsim.analysis.tails import approach, subset_simulation, tail
 from ringsim.analysis.verdicts import judge
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import WIDE, head, in_lines, legend, limits, looks_of, standing
+from ringsim.plots.campaign.frame import (
+    WIDE,
+    head,
+    in_lines,
+    legend,
+    limits,
+    looks_of,
+    shown,
+    standing,
+)
 from ringsim.plots.campaign.tornado import is_one_by_one
 from ringsim.plots.registry import picture
 from ringsim.tables import unit_behind
@@ -70,7 +79,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
     verdicts: their curve ends below 100 %.
     """
     campaign, blocks = standing(campaign)
-    names = scalars(campaign)
+    names, flat = shown(campaign)
     figure, panels, columns = style.new_panels(len(names), 3.7, 3.0, 0.9)
     short, limited = False, any(limits(campaign, name) for name in names)
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
@@ -78,8 +87,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
         of = int(tells_of(campaign, name).sum())
         short = short or len(values) < of
         share = np.arange(1, len(values) + 1) / of
-        shown = np.unique(np.linspace(0, len(values) - 1, min(len(values), _STEPS)).astype(int))
-        axes.step(np.append(values[:1], values[shown]), np.append(0.0, share[shown]), where="post",
+        kept = np.unique(np.linspace(0, len(values) - 1, min(len(values), _STEPS)).astype(int))
+        axes.step(np.append(values[:1], values[kept]), np.append(0.0, share[kept]), where="post",
                   color=style.BLUE)  # fmt: skip
         if len(values) > 1:
             axes.plot(*points(values, of), "o", color=style.INK, markersize=4, clip_on=False,
@@ -100,7 +109,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
     most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
-    notes = f" Dots: quantiles of 5, 50 and 95 %.{blocks}"
+    notes = f" Dots: quantiles of 5, 50 and 95 %.{blocks}{flat}"
     if short:
         notes += (
             " Where a curve ends below 100 %, it did not happen in the other samples: they count "
@@ -180,8 +189,9 @@ def convergence(campaign: xr.Dataset) -> Figure:
 
     Means have their interval where the design allows it, probabilities the bounds of verdicts.
     """
-    names, placed, wanted = scalars(campaign), placement(campaign), _required(campaign)
+    placed, wanted = placement(campaign), _required(campaign)
     campaign, blocks = standing(campaign)
+    names, flat = shown(campaign)
     count = len(names) + len(wanted)
     figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3)
     for axes, name in zip(panels, names, strict=False):
@@ -212,7 +222,7 @@ def convergence(campaign: xr.Dataset) -> Figure:
         _named(axes, each.told(name), len(kept))
     legend(figure, panels)
     most = max((len(values_of(campaign, name)[0]) for name in names), default=0)
-    caption = f"{told(campaign, most)}.{blocks}"
+    caption = f"{told(campaign, most)}.{blocks}{flat}"
     if not placed.has_intervals:
         caption += " No interval of the mean: the points of this design are not independent."
     if wanted:
@@ -259,7 +269,8 @@ def by_input(campaign: xr.Dataset) -> Figure:
     """
     every = campaign.sizes["sample"]
     campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
-    names, name = inputs(campaign), judged_by(campaign)
+    every_input, name = inputs(campaign), judged_by(campaign)
+    names = [each for each in every_input if _of_antenna(campaign[each])] or every_input
     words = endings(campaign)
     height = np.where(good(campaign), numbers(campaign, name), np.nan)
     known = height[np.isfinite(height)]
@@ -292,6 +303,11 @@ def by_input(campaign: xr.Dataset) -> Figure:
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
     head(figure, campaign, "Outcome by input", f"{count}{below}.{note}")
     return figure
+
+
+def _of_antenna(variable: xr.DataArray) -> bool:
+    """Whether an input is the antenna's, not one of how it is computed."""
+    return not str(variable.attrs.get("path", "")).startswith("solver.")
 
 
 def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
