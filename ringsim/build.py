@@ -19,7 +19,7 @@ campaign goes on after a figure was mended.  All else counts, also what comes ne
 
 
 def digest_of(files: Iterable[Path]) -> str:
-    """A digest of Python files below the package, by their places in it and their bytes: the same
+    """A digest of files below the package, by their places in it and their bytes: the same
     of a checkout and of a copy that was installed from it.
     """
     digest = hashlib.blake2b(digest_size=6)
@@ -32,7 +32,7 @@ def digest_of(files: Iterable[Path]) -> str:
 @functools.cache
 def sources() -> str:
     """The digest of all sources that decide about the result of a run."""
-    every = (file for file in ROOT.rglob("*.py"))
+    every = (file for kind in ("py", "c", "h") for file in ROOT.rglob(f"*.{kind}"))
     return digest_of(file for file in every if file.relative_to(ROOT).parts[0] not in AROUND)
 
 

@@ -130,8 +130,8 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
     software = f"ringsim {version('ringsim')}"
     title = scene.title or scene.name
     fidelity = Fidelity(int(outcome.values.get("fidelity", Fidelity.FULL)))
-    # The libraries whose versions decide about the numbers of each model.
-    engines = {Fidelity.FULL: f" {version('exudyn')}", Fidelity.FRAME: f" {version('numba')}"}
+    # The library whose version decides about the numbers; the core's sources are ringsim's own.
+    library = f" {version('exudyn')}" if fidelity is Fidelity.FULL else ""
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": title,
@@ -140,11 +140,11 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
         "reason": outcome.reason,
         "history": f"{now} simulated by {software}",
         "date_created": now,
-        "source": f"{software}: {fidelity.model}{engines.get(fidelity, '')}",
+        "source": f"{software}: {fidelity.model}{library}",
         "fidelity": fidelity.word,
         "creator_name": "ringsim",
         **build.provenance(),
-        **{f"{name}_version": version(name) for name in ("exudyn", "numba", "numpy")},
+        **{f"{name}_version": version(name) for name in ("exudyn", "numpy")},
         "python_version": platform.python_version(),
         "scene": scene.to_toml(),
         **({"began": outcome.began} if outcome.began else {}),

@@ -6,7 +6,6 @@ Engines are imported by whoever runs them: each costs a second, and its own libr
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,9 +15,7 @@ import numpy as np
 
 from ringsim.cable import friction
 from ringsim.choice import kind_of
-from ringsim.compile_cache import compile_once
 from ringsim.outputs.balance import with_bars
-from ringsim.outputs.family import holds
 from ringsim.outputs.recorder import StoredState
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError, known_or_nearest, show
@@ -40,9 +37,6 @@ Watch = Callable[[Instant], None]
 """What is shown every accepted state of a run."""
 Solve = Callable[[Scene, Watch | None], Outcome]
 """An engine."""
-
-_COMPILING_STEPS = 5
-"""Steps of the run that compiles: predictor and damping take three to be complete."""
 
 
 def run(
@@ -69,15 +63,8 @@ def run(
 
 
 def prepare_run(scene: Scene) -> None:
-    """Load what ``run`` needs, so that the time of the first run is that of a run; the chain of
-    cables is compiled once a machine.
-    """
+    """Load what ``run`` needs, so that the time of the first run is that of a run."""
     import ringsim.exudyn.integrate  # noqa: F401
-
-    if scene.cables is not None:
-        from ringsim.compiled.chain import try_chain
-
-        compile_once("chain", try_chain)
 
 
 def run_frame(
@@ -105,33 +92,15 @@ def run_frame(
 
 
 def prepare_run_frame(scene: Scene) -> None:
-    """Load what ``run_frame`` needs, and compile it for scenes like this one, once a machine.
+    """Load what ``run_frame`` needs.
 
     Raises
     ------
     InputError
-        If it cannot represent the scene.
+        If it cannot represent the scene's rods.
     """
     _refuse_other_rods(scene)
-    from ringsim.frame.integrate import solve
-
-    left = iter(range(_COMPILING_STEPS))
-
-    def watch(now: Instant) -> None:
-        next(left)  # raises StopIteration
-
-    def compiling() -> None:
-        with suppress(StopIteration):
-            solve(scene, watch)
-
-    parts = (getattr(scene, name) for name in ("rods", *sorted(type(scene).parts())))
-    kinds = [kind_of(each) for each in parts if hasattr(each, "kind")]
-    try:
-        compile_once((sorted(holds(scene)), kinds), compiling)
-    except InputError:
-        raise
-    except Exception:  # it breaks in the run, too, which tells of it; nothing counts as compiled
-        return
+    import ringsim.frame.integrate  # noqa: F401
 
 
 def why_not_frame(scene: Scene) -> str:

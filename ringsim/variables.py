@@ -137,7 +137,7 @@ class Fidelity(Code):
         """What it is, in words."""
         return {
             Fidelity.FULL: "multibody simulation with exudyn",
-            Fidelity.FRAME: "flexible rods in joint coordinates, compiled with numba",
+            Fidelity.FRAME: "flexible rods in joint coordinates, computed in C",
         }[self]
 
 

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from ringsim.cable.chain import ChainState
-from ringsim.compiled.chain import Chain
+from ringsim.core.chain import Chain
 from ringsim.parts.persection import at_section
 from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.statics import OneCoordinate

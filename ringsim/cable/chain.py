@@ -20,7 +20,7 @@ begins as long as its path is off by 1e-15, as lengths of points in another orde
 
 @dataclass(frozen=True)
 class ChainState:
-    """All spans, pulleys and ropes at one instant; see ``ringsim.compiled.tension``."""
+    """All spans, pulleys and ropes at one instant; see ``ringsim.core.tension``."""
 
     ropes: Ropes
     material: Array

@@ -13,7 +13,7 @@ from ringsim.units import FrictionCoefficient, MetreOrZero, Model
 # Slip speed that regularises pulley friction, and the error that it causes at low speed.
 #
 # Friction reverses with the rope; p_j = tanh(s_j / s_slip) of the full decay makes that smooth
-# (``ringsim.compiled.tension``).  On a ring of N sections that open evenly the 2 N spans beside the
+# (``ringsim.core.tension``).  On a ring of N sections that open evenly the 2 N spans beside the
 # V pulleys give the rope free, so a pulley with m of them beyond it sees
 #
 #     s = m v,   v = winding speed / (2 N) = 1.5 winding speed / (spans of the cable),

@@ -177,7 +177,7 @@ class Winch(Model):
 
 
 class Cable(Model):
-    """A cable over the pulleys of its plane; see ``ringsim.compiled.tension`` for the equations."""
+    """A cable over the pulleys of its plane; see ``ringsim.core.tension`` for the equations."""
 
     end: Literal["first", "last", "both"] = "first"
     """Where the winch is: at section 1, at the last section, or one at either end."""

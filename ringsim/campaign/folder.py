@@ -177,8 +177,6 @@ def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
         "the version of exudyn": attributes["exudyn_version"],
         "its inputs": [column.path for column in table.columns],
         "its solver": attributes["solver"],
-        "the version of numba": attributes.get("numba_version")
-        if attributes["solver"] == SOLVERS["frame"] else None,
     }  # fmt: skip
 
 
@@ -235,7 +233,7 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
     mine = {
         "scene": campaign.scene.to_toml(), "seed": campaign.specification.seed, "solver": solver,
         "sources": build.sources(),
-        **{f"{name}_version": version(name) for name in ("exudyn", "numba")},
+        "exudyn_version": version("exudyn"),
     }  # fmt: skip
     wanted = _decisive(table, mine)
     what = " and ".join(word for word in wanted if wanted[word] != held[word])

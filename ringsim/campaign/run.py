@@ -28,7 +28,6 @@ from ringsim.campaign.folder import (
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
 from ringsim.campaign.stopping import Watch, as_decided, merge
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
-from ringsim.compile_cache import choose_folder
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.slot import Local, Serial
 from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost
@@ -109,8 +108,6 @@ def run_campaign(folder: Path, choices: Choices) -> int:
         if fault := scheduler.from_first(fault):
             raise InputError(fault)
         campaign = open_folder(folder)
-        if scheduler.rank == 0 and campaign.attributes["solver"] == SOLVERS["frame"]:
-            choose_folder()  # tells, where it is a temporary one; solver processes tell nobody
         _run_missing(campaign, choices, stop)
         try:
             return _conclude(campaign, choices, stop) if scheduler.rank == 0 else EXIT_DONE

@@ -161,7 +161,7 @@ class Watch:
 _KEPT = (
     "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "design",
     "requirements", "check_every", "judge", "max_difference", "stop_when", "suspects", "source",
-    "ringsim_version", "git_commit", "sources", "exudyn_version", "numba_version",
+    "ringsim_version", "git_commit", "sources", "exudyn_version",
 )  # fmt: skip
 """Attributes of the design that a merged file has, too: what it was run with, whoever merges."""
 

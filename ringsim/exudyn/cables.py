@@ -10,8 +10,8 @@ from ringsim.cable.chain import ChainState
 from ringsim.cable.records import Cables
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import Winches
-from ringsim.compiled.chain import Chain
-from ringsim.compiled.tension import PASSING
+from ringsim.core.chain import Chain
+from ringsim.core.tension import PASSING
 from ringsim.exudyn.assembly import Array, Assembly, Indices
 from ringsim.exudyn.cable_path import CablePath, Placed
 from ringsim.stepping.locks import Turning
@@ -22,7 +22,7 @@ from ringsim.stepping.locks import Turning
 # of its difference vector (three) and of its tension (one), for every rope that of its mean
 # tension.  The coupling of all spans of a rope through its mean tension is then a few sparse rows
 # instead of a dense block over the whole ring; eliminating the unknowns gives P^T (dF/dx) P with
-# the material, decay and geometric parts of ringsim.compiled.tension.  The decay part alone is
+# the material, decay and geometric parts of ringsim.core.tension.  The decay part alone is
 # dense (spans by spans).  Its entries are written only where they matter to Newton's convergence:
 # those of friction that turns round within a step.  Velocities of the points are taken as fixed
 # while nodes turn at fixed rates; against the rest that is of the order of a node's turn within one
@@ -176,7 +176,7 @@ class CableDrive:
     present, path
         The cables with their planes, and what they run over, on the model's nodes.
     chain, ropes, winches
-        See ringsim.compiled.chain and ringsim.cable; faults replace the ropes.
+        See ringsim.core.chain and ringsim.cable; faults replace the ropes.
     refusal
         Why the chain last had no answer to a state that Newton tried; empty if it always had.
     """

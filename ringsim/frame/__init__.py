@@ -1,1 +1,1 @@
-"""The frame engine: rings in joint coordinates, compiled; see docs/theory/frame.md."""
+"""The frame engine: rings in joint coordinates, in C; see docs/theory/frame.md."""

@@ -1,4 +1,4 @@
-"""Laws of parts and cables as lists of operations, which compiled code plays back."""
+"""Laws of parts and cables as lists of operations, which the core plays back."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from ringsim.compiled.vectors import compiled
-from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh, Skeleton
+from ringsim.core.library import call
+from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Skeleton
 from ringsim.layout.bodies import Array, JointOpening
 from ringsim.parts.joints import JointFriction
 from ringsim.parts.laws import AngleLaw, Reaction, Rub, Switches
@@ -15,7 +15,7 @@ from ringsim.parts.persection import at_section
 from ringsim.refusal import InputError
 from ringsim.stepping.locks import Turning
 
-# Laws of ringsim.parts and ringsim.cable as lists of operations, which compiled code plays back.
+# Laws of ringsim.parts and ringsim.cable as lists of operations, which the core plays (laws.c).
 #
 # A law is Python that numpy, exudyn's expressions and this module can follow: called once on rows
 # that note what is done with them, it leaves a tape.  So one file serves all engines, and Newton's
@@ -31,13 +31,6 @@ _KNOWN = (
     np.greater, np.less, np.greater_equal, np.less_equal, np.arctan, np.expm1, np.log1p,
     np.positive, np.where,
 )  # fmt: skip
-(
-    _ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MAXIMUM, _MINIMUM, _NEGATIVE, _ABSOLUTE,
-    _SIGN, _SQRT, _SQUARE, _POWER, _EXP, _LOG, _SIN, _COS, _TANH, _ARCTANH,
-    _GREATER, _LESS, _GREATER_EQUAL, _LESS_EQUAL, _ARCTAN, _EXPM1, _LOG1P,
-    _POSITIVE, _WHERE,
-) = range(len(_KNOWN))  # fmt: skip
-
 Law = Callable[..., Any]
 
 
@@ -100,7 +93,7 @@ class _Notes:
 
     def end(self, found: Any, place: int) -> None:
         """Put a result into its row."""
-        self._note(_POSITIVE, place, [self._place(found)])
+        self._note(_KNOWN.index(np.positive), place, [self._place(found)])
 
     def _note(self, kind: int, to: int, operands: list[int]) -> None:
         self.code.append((kind, to, *operands, *[0] * (3 - len(operands))))
@@ -152,97 +145,16 @@ def taped(laws: Sequence[tuple[Law, tuple[int, ...], object]], inputs: int, resu
     return Tape(operations, np.array(table, dtype=np.int64).reshape(-1, 4), rows)
 
 
-@compiled
 def play(tape: Tape) -> None:
     """Compute the results from the inputs."""
-    for law in range(len(tape.laws)):
-        first, last, left, right = tape.laws[law]
-        for n in range(first, last):
-            kind, to, first_row, second_row, third_row = tape.code[n]
-            out = tape.rows[to, left:right]
-            x, y = tape.rows[first_row, left:right], tape.rows[second_row, left:right]
-            if kind == _ADD:
-                for k in range(len(out)):
-                    out[k] = x[k] + y[k]
-            elif kind == _SUBTRACT:
-                for k in range(len(out)):
-                    out[k] = x[k] - y[k]
-            elif kind == _MULTIPLY:
-                for k in range(len(out)):
-                    out[k] = x[k] * y[k]
-            elif kind == _DIVIDE:
-                for k in range(len(out)):
-                    out[k] = x[k] / y[k]
-            elif kind == _MAXIMUM:
-                for k in range(len(out)):
-                    out[k] = x[k] if x[k] >= y[k] or x[k] != x[k] else y[k]
-            elif kind == _MINIMUM:
-                for k in range(len(out)):
-                    out[k] = x[k] if x[k] <= y[k] or x[k] != x[k] else y[k]
-            elif kind == _NEGATIVE:
-                for k in range(len(out)):
-                    out[k] = -x[k]
-            elif kind == _POSITIVE:
-                for k in range(len(out)):
-                    out[k] = x[k]
-            elif kind == _WHERE:
-                z = tape.rows[third_row, left:right]
-                for k in range(len(out)):
-                    out[k] = y[k] if x[k] != 0.0 else z[k]
-            else:
-                _play_function(kind, x, y, out)
-
-
-@compiled
-def _play_function(kind: int, x: Array, y: Array, out: Array) -> None:
-    """Functions of one number, and rarer ones of two."""
-    for k in range(len(out)):
-        a = x[k]
-        if kind == _ABSOLUTE:
-            out[k] = abs(a)
-        elif kind == _SIGN:
-            out[k] = np.sign(a)
-        elif kind == _SQRT:
-            out[k] = np.sqrt(a)
-        elif kind == _SQUARE:
-            out[k] = a * a
-        elif kind == _POWER:
-            out[k] = a * a if y[k] == 2.0 else a ** y[k]
-        elif kind == _EXP:
-            out[k] = np.exp(a)
-        elif kind == _LOG:
-            out[k] = np.log(a)
-        elif kind == _SIN:
-            out[k] = np.sin(a)
-        elif kind == _COS:
-            out[k] = np.cos(a)
-        elif kind == _TANH:
-            out[k] = np.tanh(a)
-        elif kind == _ARCTANH:
-            out[k] = np.arctanh(a)
-        elif kind == _ARCTAN:
-            out[k] = np.arctan(a)
-        elif kind == _EXPM1:
-            out[k] = np.expm1(a)
-        elif kind == _LOG1P:
-            out[k] = np.log1p(a)
-        elif kind == _GREATER:
-            out[k] = 1.0 if a > y[k] else 0.0
-        elif kind == _GREATER_EQUAL:
-            out[k] = 1.0 if a >= y[k] else 0.0
-        elif kind == _LESS:
-            out[k] = 1.0 if a < y[k] else 0.0
-        else:
-            out[k] = 1.0 if a <= y[k] else 0.0
+    call("play", tape)
 
 
 # Torques on joint angles: friction, stops and joints that stick, by the laws of ringsim.parts.
 
 
-_NUDGE = 1e-7
-"""Change of angle (rad) and rate (rad/s) by which the slopes of laws are measured."""
-_TURNED, _RATE, _ON, _SETTING, _ELASTIC, _DAMPING, _STORED = range(7)
-"""Rows of the laws' tape: coordinate and rate, whether the law acts, its setting; its Reaction."""
+_ON, _SETTING = 2, 3
+"""Rows of the laws' tape: whether the law acts, and its setting, behind coordinate and rate."""
 
 
 class Acting(NamedTuple):
@@ -257,56 +169,9 @@ class Acting(NamedTuple):
     soft: int
 
 
-@compiled
-def _feel(acting: Acting, angles: Array, rates: Array, more: float, faster: float) -> None:
-    """Play the laws at angles and rates, with all coordinates and rates so much larger."""
-    rows = acting.tape.rows
-    for n in range(len(acting.own)):
-        k, sense = acting.own[n], acting.sense[n]
-        rows[_TURNED, n] = sense * angles[k] + more
-        rows[_RATE, n] = sense * rates[k] + faster
-    play(acting.tape)
-
-
-@compiled
-def push_joints(acting: Acting, angles: Array, rates: Array, mesh: Mesh, g: Array) -> None:
-    """Add torques to a residual."""
-    _feel(acting, angles, rates, 0.0, 0.0)
-    rows = acting.tape.rows
-    for n in range(len(acting.own)):
-        total = rows[_ELASTIC, n] + rows[_DAMPING, n]
-        g[mesh.angle_home[acting.own[n]]] += acting.sense[n] * total
-
-
-@compiled
-def add_joint_slopes(
-    acting: Acting, angles: Array, rates: Array, by_rate: float, mesh: Mesh, fronts: Array
-) -> None:
-    """Add derivatives after the angles to the fronts, by central differences; ``by_rate`` is that
-    of rates, 1/s.
-    """
-    rows, n = acting.tape.rows, acting.soft
-    slopes = np.zeros((2, n))
-    for side in (1.0, -1.0):
-        for what in range(2):
-            _feel(acting, angles, rates, (1 - what) * side * _NUDGE, what * side * _NUDGE)
-            for k in range(n):
-                slopes[what, k] += side * (rows[_ELASTIC, k] + rows[_DAMPING, k])
-    for k in range(n):
-        front, spot = mesh.angle_local[acting.own[k], 0], mesh.angle_local[acting.own[k], 1]
-        whole = slopes[0, k] + by_rate * slopes[1, k]
-        fronts[front, spot, spot] += whole / (2.0 * _NUDGE)
-
-
-@compiled
 def passing_joints(acting: Acting, angles: Array, rates: Array, lost: Array) -> float:
     """Add torques that dissipate to ``lost``; returns the energy stored, J."""
-    _feel(acting, angles, rates, 0.0, 0.0)
-    rows, stored = acting.tape.rows, 0.0
-    for n in range(len(acting.own)):
-        lost[acting.own[n]] += acting.sense[n] * rows[_DAMPING, n]
-        stored += rows[_STORED, n]
-    return stored
+    return float(call("passing_joints", acting, angles, rates, lost))
 
 
 class Torques(NamedTuple):

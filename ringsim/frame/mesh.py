@@ -372,7 +372,7 @@ class Parts:
                 ]
 
 
-# A layout in joint coordinates as arrays, for compiled code.
+# A layout in joint coordinates as arrays, for the core.
 
 
 class Mesh(NamedTuple):

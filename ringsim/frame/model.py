@@ -8,7 +8,7 @@ import numpy as np
 from ringsim.choice import kind_of
 from ringsim.frame.cables import Arms, FrameCables, no_lines
 from ringsim.frame.elimination import Border, Factored, Fronts
-from ringsim.frame.kernels import Pose, Strains, add_forces, move
+from ringsim.frame.kernels import Pose, Strains, add_forces, move, room_for_loads
 from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.mesh import CURE, NOT_HERE, Skeleton, mesh_of
 from ringsim.frame.springs import STIFFNESS, BeamSlide, RigidSlide, Slide, Web
@@ -140,7 +140,7 @@ class FrameModel:
             weighs=self.layout.gravity is not None,
             gravity=self.gravity,
         )
-        self._held_loads = np.zeros((len(mesh.length), 5, 3, 3))
+        self._held_loads = room_for_loads(mesh)
         self._string_spots = mesh.home[ends][:, None] + np.arange(3)
         self._lines = no_lines() if self.cables is None else self.cables.lines
         self._arms = Arms.empty(lines)
@@ -221,8 +221,7 @@ class FrameModel:
         border = Border.empty(mesh.unknowns, factors, strung, hub_inertia)
         differentiate(
             mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, self._held_loads,
-            strains.lead, by_rate, by_place, strung, fronts, border.columns, border.rows,
-            border.corner,
+            strains.lead, by_rate, by_place, self._fronts, border,
         )  # fmt: skip
         for own, slopes in self.laws.dry_slopes(now.rate.angles):
             front, spot = mesh.angle_local[own].T
@@ -232,7 +231,7 @@ class FrameModel:
         if self.hanging is not None:
             self.hanging.add_tangent(now, by_rate, by_place, fronts)
         if cables is not None:
-            cables.add_tangent(self._arms, now.rate.lines, by_rate, factors, fronts, border)
+            cables.add_tangent(self._arms, now.rate.lines, by_rate, factors, self._fronts, border)
         return Factored(mesh, self._fronts, border)
 
     def _place(self, state: State) -> None:

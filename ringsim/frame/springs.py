@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.compiled.vectors import compiled, cross, dot, minus, times, vector
+from ringsim.core.library import call
 from ringsim.frame.kernels import Pose
-from ringsim.frame.laws import Law, Tape, play, taped
+from ringsim.frame.laws import Law, Tape, taped
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.layout import Layout
@@ -16,13 +16,8 @@ from ringsim.parts.laws import HUB as FREE
 from ringsim.parts.laws import PairLaw
 from ringsim.refusal import InputError
 
-# Laws between bodies, and from bodies to the hub of a net, a point with three unknowns of its own.
-
-
-_NUDGE = 1e-7
-"""Change of stretch (m) and its rate (m/s) by which the slopes of the law are measured."""
-_STRETCH, _RATE, _ELASTIC, _DAMPING, _STORED = range(5)
-"""Rows of the laws' tape."""
+# Laws between bodies, and from bodies to the hub of a net, a point with three unknowns of its own
+# (balance.c).
 
 
 class Web(NamedTuple):
@@ -76,7 +71,6 @@ def _spots(mesh: Mesh, first: int, second: int) -> tuple[int, int, int]:
     return front, own.index(int(ends[0])), own.index(int(ends[1]))
 
 
-@compiled
 def stretched(
     web: Web, ends: Array, rates: Array, hub: Array, hub_rate: Array
 ) -> tuple[Array, Array, Array]:
@@ -85,96 +79,8 @@ def stretched(
     """
     n = len(web.first)
     lengths, along, units = np.empty(n), np.empty(n), np.empty((n, 3))
-    for k in range(n):
-        one, other = web.first[k], web.second[k]
-        start = vector(ends[one]) if one >= 0 else vector(hub)
-        moving = vector(rates[one]) if one >= 0 else vector(hub_rate)
-        arm = minus(vector(ends[other]), start)
-        length = math.sqrt(dot(arm, arm))
-        unit = times(1.0 / length, arm)
-        lengths[k], along[k] = length, dot(unit, minus(vector(rates[other]), moving))
-        units[k, 0], units[k, 1], units[k, 2] = unit
+    call("stretched", web, ends, rates, hub, hub_rate, lengths, along, units)
     return lengths, along, units
-
-
-@compiled
-def _feel(web: Web, lengths: Array, along: Array, more: float, faster: float) -> None:
-    """Play the laws at lengths and rates, all so much larger."""
-    rows = web.tape.rows
-    for k in range(len(lengths)):
-        rows[_STRETCH, k] = lengths[k] - web.natural[k] + more
-        rows[_RATE, k] = along[k] + faster
-    play(web.tape)
-
-
-@compiled
-def _force(web: Web, k: int) -> float:
-    return float(web.tape.rows[_ELASTIC, k] + web.tape.rows[_DAMPING, k])
-
-
-@compiled
-def pull_pairs(
-    web: Web, mesh: Mesh, ends: Array, rates: Array, hub: Array, hub_rate: Array, g: Array
-) -> bool:
-    """Add what resists at the bodies and, in the last three unknowns, at the hub; returns whether a
-    string pulls at the hub.
-    """
-    lengths, along, units = stretched(web, ends, rates, hub, hub_rate)
-    _feel(web, lengths, along, 0.0, 0.0)
-    strung = False
-    for n in range(len(web.first)):
-        pull, one = _force(web, n), web.first[n]
-        if pull == 0.0:
-            continue
-        strung |= one < 0
-        start = mesh.home[web.ends[one]] if one >= 0 else len(g) - 3
-        end = mesh.home[web.ends[web.second[n]]]
-        for i in range(3):
-            g[end + i] += pull * units[n, i]
-            g[start + i] -= pull * units[n, i]
-    return strung
-
-
-@compiled
-def add_pairs(
-    web: Web, mesh: Mesh, ends: Array, rates: Array, hub: Array, hub_rate: Array, by_rate: float,
-    strung: bool, fronts: Array, columns: Array, rows: Array, corner: Array,
-) -> None:  # fmt: skip
-    """Add derivatives of the pulls to the fronts and, if the hub is ``strung``, those after its
-    place to the first three columns, rows and corner of the border; ``by_rate`` is the derivative
-    of rates after places, 1/s.
-    """
-    lengths, along, units = stretched(web, ends, rates, hub, hub_rate)
-    slope, block = np.zeros(len(lengths)), np.zeros((3, 3))
-    for side in (1.0, -1.0):
-        for what in range(2):
-            _feel(web, lengths, along, (1 - what) * side * _NUDGE, what * side * _NUDGE)
-            share = side / (2.0 * _NUDGE) * (1.0 if what == 0 else by_rate)
-            for n in range(len(slope)):
-                slope[n] += share * _force(web, n)
-    _feel(web, lengths, along, 0.0, 0.0)
-    for n in range(len(slope)):
-        free = web.first[n] < 0
-        if free and not strung:
-            continue
-        front, first, second = web.spots[n]
-        across = _force(web, n) / lengths[n]
-        for i in range(3):
-            for j in range(3):
-                block[i, j] = (slope[n] - across) * units[n, i] * units[n, j]
-            block[i, i] += across
-        home = mesh.home[web.ends[web.second[n]]]
-        for i in range(3):
-            for j in range(3):
-                fronts[front, second + i, second + j] += block[i, j]
-                if free:
-                    columns[home + i, j] -= block[i, j]
-                    rows[home + i, j] -= block[i, j]
-                    corner[i, j] += block[i, j]
-                else:
-                    fronts[front, first + i, first + j] += block[i, j]
-                    fronts[front, first + i, second + j] -= block[i, j]
-                    fronts[front, second + i, first + j] -= block[i, j]
 
 
 def passing_pairs(
@@ -184,9 +90,8 @@ def passing_pairs(
     (m/s).
     """
     lengths, along, _ = stretched(web, ends, rates, hub, hub_rate)
-    _feel(web, lengths, along, 0.0, 0.0)
-    rows = web.tape.rows
-    return float(rows[_STORED].sum()), rows[_DAMPING].copy(), lengths, along
+    lost = np.empty(len(lengths))
+    return float(call("passing_pairs", web, lengths, along, lost)), lost, lengths, along
 
 
 # Bodies that slide along a boom: a stiff spring across it.
@@ -242,30 +147,15 @@ class Slide:
         fronts[front][np.ix_(places, places)] += self._stiffness * (gap.rows.T @ gap.rows)
 
 
-@compiled
 def aside(pose: Pose, top: int, low: int, reach: float) -> tuple[Array, Array]:
     """Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12).
 
     If turns are held, those about its axes times ``reach`` (m) stand behind, (5,) and (5, 12): half
     the axial vector of R_1^T R_2, a turn as long as it is small; ``reach`` is else 0.
     """
-    size = 5 if reach > 0.0 else 2
-    gaps, rows = np.empty(size), np.zeros((size, 12))
-    apart, axes = minus(vector(pose.place[low]), vector(pose.place[top])), pose.axes[top]
-    for k in range(2):
-        axis = vector(axes[:, k])
-        gaps[k], turned = dot(axis, apart), cross(axis, apart)
-        for i in range(3):
-            rows[k, i], rows[k, 3 + i], rows[k, 6 + i] = -axis[i], turned[i], axis[i]
-    for k in range(size - 2):
-        first, second = (k + 1) % 3, (k + 2) % 3
-        sine = 0.0
-        for i in range(3):
-            sine += axes[i, second] * pose.axes[low, i, first]
-            sine -= axes[i, first] * pose.axes[low, i, second]
-            rows[2 + k, 3 + i], rows[2 + k, 9 + i] = -reach * axes[i, k], reach * axes[i, k]
-        gaps[2 + k] = 0.5 * reach * sine
-    return gaps, rows
+    gaps, rows = np.empty(5), np.empty((5, 12))
+    size = call("aside", pose, top, low, reach, gaps, rows)
+    return gaps[:size], rows[:size]
 
 
 class RigidSlide(Slide):

@@ -240,7 +240,7 @@ class PulleyRatio(Output):
     """Tension behind each pulley over that before it, both seen from the cable's first winch.
 
     The decay factor of paper 000, eq. 9 (figs 6 and 7), as it acts: eta ** tanh(s / s_slip) of the
-    rope's speed s over the pulley, see ``ringsim.compiled.tension``.  It exceeds 1 where rope runs
+    rope's speed s over the pulley, see ``ringsim.core.tension``.  It exceeds 1 where rope runs
     away from the winch; at a jammed pulley, where two ropes meet, it is the quotient of their
     tensions.
     """

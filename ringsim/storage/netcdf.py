@@ -31,7 +31,7 @@ from ringsim.variables import Fidelity, Variable, flags_of
 
 
 DESIGN = "design.nc"
-_PACKAGES = ("exudyn", "numba", "numpy", "scipy", "netCDF4", "mpi4py")
+_PACKAGES = ("exudyn", "numpy", "scipy", "netCDF4", "mpi4py")
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run, and of codes that are missing."""

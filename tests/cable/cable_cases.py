@@ -14,7 +14,7 @@ from ringsim.cable.friction import (
 )
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winding import ConstantWinding
-from ringsim.compiled.chain import Chain
+from ringsim.core.chain import Chain
 
 RADIUS = 0.01
 LAWS = {

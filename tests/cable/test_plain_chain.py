@@ -9,7 +9,7 @@ from stribeck import StribeckFriction
 from cable_cases import RADIUS, Case, cable
 from plain_chain import plain_state
 from ringsim.cable.friction import BearingFriction, CapstanFriction
-from ringsim.compiled.chain import Chain
+from ringsim.core.chain import Chain
 
 pytestmark = pytest.mark.quick
 

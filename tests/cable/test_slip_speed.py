@@ -12,7 +12,7 @@ from ringsim.cable.friction import BearingFriction
 from ringsim.cable.records import AnyWinding, Winch
 from ringsim.cable.winding import ConstantWinding, PrescribedWinding, Winding
 from ringsim.choice import kinds_of
-from ringsim.compiled.chain import Chain
+from ringsim.core.chain import Chain
 
 pytestmark = pytest.mark.quick
 

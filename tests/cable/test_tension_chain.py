@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cable_cases import LAWS, RADIUS, Case, cable, decays, eta, random_case, still
 from ringsim.cable import ropes
 from ringsim.cable.friction import BearingFriction
-from ringsim.compiled.chain import Chain
+from ringsim.core.chain import Chain
 
 pytestmark = pytest.mark.quick
 

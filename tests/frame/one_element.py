@@ -8,12 +8,19 @@ import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from ringsim.compiled.vectors import turned
-from ringsim.frame.kernels import carried, coefficients, element_tangent, middle, scaled
+from ringsim.frame.elimination import Fronts
+from ringsim.frame.kernels import (
+    Pose,
+    Strains,
+    add_forces,
+    begin_tangent,
+    room_for_loads,
+)
+from ringsim.frame.mesh import Mesh
 
 Array = NDArray[np.float64]
-REST = (0.0, 0.0, 0.0)
 LENGTH = 0.3
 STIFFNESS = np.array([4e2, 5e1, 5e1]), np.array([1.0, 3.0, 3.0])
 """Of u (N/m) and psi (N m): what a bend of 1 rad needs moves the middle by some tenths."""
@@ -46,7 +53,7 @@ class Ends(NamedTuple):
 
 def rotation(vector: Array) -> Array:
     """Matrix of a rotation vector."""
-    return np.array(turned(tuple(vector))).reshape(3, 3)
+    return Rotation.from_rotvec(vector).as_matrix()
 
 
 def bent(rng: np.random.Generator, angle: float) -> Ends:
@@ -59,43 +66,54 @@ def bent(rng: np.random.Generator, angle: float) -> Ends:
     return Ends(x1, r1, x2, r2)
 
 
-def strains(ends: Ends) -> tuple[Array, Array, Array]:
-    """Axes of the middle, u and psi."""
-    across = tuple(ends.x2 - ends.x1)
-    axes, u, psi, _ = middle(tuple(ends.r1.ravel()), tuple(ends.r2.ravel()), across, LENGTH)
-    return np.array(axes), np.array(u), np.array(psi)
+# A model of this element alone, without mass, between two frames at its ends.
+_NUMBERS = np.zeros(0, np.int64)
+_MESH = Mesh(
+    frame=np.array([[0, 1]]), angle=np.full((1, 2), -1), axes=np.tile(np.eye(3), (1, 2, 1, 1)),
+    point=np.array([[0, 1]]), length=np.array([LENGTH]),
+    stiffness=np.concatenate(STIFFNESS)[None], mass=np.zeros((1, 2)), tau=np.zeros(1),
+    point_frame=np.array([0, 1]), point_arm=np.zeros((2, 3)), point_mass=np.zeros(2),
+    home=np.array([0, 6]), angle_home=_NUMBERS, part=np.array([0]),
+    local=np.array([[*range(6), -1, *range(6, 12), -1]]), angle_local=np.zeros((0, 2), np.int64),
+    frame_local=np.array([[0, 0], [0, 6]]), gone=np.array([12]), size=np.array([12]),
+    spots=np.arange(12)[None], parent=np.array([-1]), up=np.full((1, 12), -1), fixed=_NUMBERS,
+    craft=_NUMBERS, unknowns=12,
+)  # fmt: skip
+
+
+def _loaded(ends: Ends) -> tuple[Pose, Array, Array, Array, Array]:
+    """Pose, places of the points, strains, what the element holds and forces."""
+    points = np.array([ends.x1, ends.x2])
+    pose = Pose(points.copy(), np.array([ends.r1, ends.r2]), np.zeros(0))
+    now, loads, found = np.zeros((1, 6)), room_for_loads(_MESH), np.zeros(12)
+    rest = np.zeros((2, 3))
+    add_forces(_MESH, pose, points, rest, Strains(now, np.zeros((1, 6)), 0.0), loads, found)
+    return pose, points, now[0], loads, found
+
+
+def strains(ends: Ends) -> tuple[Array, Array]:
+    """u and psi."""
+    _, _, found, _, _ = _loaded(ends)
+    return found[:3], found[3:]
 
 
 def energy(ends: Ends) -> float:
-    _, u, psi = strains(ends)
+    u, psi = strains(ends)
     return float(0.5 * (STIFFNESS[0] @ u**2 + STIFFNESS[1] @ psi**2))
 
 
 def forces(ends: Ends) -> Array:
     """Forces and moments on (x1, phi1, x2, phi2), shape (12,)."""
-    n, w, m = (np.array(each) for each in _loads(ends))
-    return np.concatenate([-n, -m - 0.5 * w, n, m - 0.5 * w])
-
-
-def tangent(ends: Ends) -> Array:
-    """``element_tangent``, shape (12, 12)."""
-    n, w, m = _loads(ends)
-    axes, _, psi = strains(ends)
-    found = np.zeros((12, 12))
-    own, bending = coefficients(tuple(psi)), tuple(psi)
-    element_tangent(
-        tuple(axes), tuple(ends.x2 - ends.x1), n, w, m, bending, own, *map(tuple, STIFFNESS), found
-    )
+    *_, found = _loaded(ends)
     return found
 
 
-def _loads(ends: Ends) -> tuple[tuple[float, ...], ...]:
-    axes, u, psi = strains(ends)
-    force = scaled(tuple(STIFFNESS[0]), tuple(u), REST, 0.0)
-    moment = scaled(tuple(STIFFNESS[1]), tuple(psi), REST, 0.0)
-    bending = tuple(psi)
-    own = coefficients(bending)
-    return carried(tuple(axes), tuple(ends.x2 - ends.x1), force, moment, bending, own)
+def tangent(ends: Ends) -> Array:
+    """Their derivative, shape (12, 12)."""
+    pose, points, _, loads, _ = _loaded(ends)
+    fronts = Fronts.empty(_MESH)
+    begin_tangent(_MESH, pose, points, np.zeros((2, 3)), loads, 0.0, 0.0, fronts)
+    return fronts.whole[0, :12, :12].copy()
 
 
 def differences(function, ends: Ends, step: float = 1e-6) -> Array:

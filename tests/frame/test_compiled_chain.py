@@ -12,8 +12,8 @@ from ringsim.cable.friction import BearingFriction, CapstanFriction
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winding import ConstantWinding
-from ringsim.compiled.chain import Chain
-from ringsim.compiled.tension import (
+from ringsim.core.chain import Chain
+from ringsim.core.tension import (
     PASSING,
     Drums,
     RopeTable,

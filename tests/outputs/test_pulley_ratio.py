@@ -12,7 +12,7 @@ import xarray as xr
 from ringsim.cable.friction import BearingFriction
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winding import ConstantWinding
-from ringsim.compiled.chain import Chain
+from ringsim.core.chain import Chain
 from ringsim.outputs.cables import PulleyRatio
 from ringsim.outputs.family import Series
 from ringsim.scene import load_scene

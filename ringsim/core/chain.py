@@ -8,10 +8,9 @@ import numpy as np
 
 from ringsim.cable.chain import ChainState, pulley_tensions
 from ringsim.cable.friction import MOST_SOLVED, SOLVED, UNSOLVED, Friction, Pulleys
-from ringsim.cable.records import Cable, Winch
+from ringsim.cable.records import Cable
 from ringsim.cable.ropes import Array, Indices, Ropes
-from ringsim.cable.winding import ConstantWinding
-from ringsim.compiled.tension import (
+from ringsim.core.tension import (
     PASSING,
     Drums,
     RopeTable,
@@ -232,11 +231,3 @@ class Chain:
         measure(table, ropes.behind, points, velocities, spans)
         ropes.require_length(spans.length)
         return table, spans
-
-
-def try_chain() -> None:
-    """Evaluate a rope over a pulley and its tangent, so that all that a chain needs is compiled."""
-    chain = Chain([Cable(winch=Winch(winding=ConstantWinding(speed=0.01)))], [3])
-    points, nothing = np.diag([1.0, 2.0, 3.0]), np.zeros((1, 2))
-    state = chain.state(chain.start(points), points, points, nothing, nothing)
-    chain.changes(state, points, state.exponent_slopes, np.ones(1), 1.0, 1.0)

@@ -1,14 +1,13 @@
-"""The law of the ropes, compiled for both engines: tensions of all spans, and how they change."""
+"""The law of the ropes, for both engines: tensions of all spans, and how they change."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ringsim.cable.ropes import Array, Indices, Ropes
-from ringsim.compiled.vectors import compiled, dot, minus, plus, put, times, vector
+from ringsim.core.library import call
 
-# The tension chain of all cables, from positions and velocities of their pulleys.
+# The tension chain of all cables, from positions and velocities of their pulleys (ropes.c).
 #
 # Spans i = 0 .. n-1 run from the winch to the far end, pulley j = 1 .. n-1 stands between spans
 # j-1 and j.  For each rope (metre, newton, second):
@@ -112,114 +111,30 @@ class Spans(NamedTuple):
                    np.zeros(pulleys), np.zeros(pulleys))  # fmt: skip
 
 
-@compiled
 def measure(table: RopeTable, behind: Indices, places: Array, rates: Array, spans: Spans) -> float:
     """Lengths, rates, directions and angles of places and rates of the points, (points, 3);
     returns the least length, m.
     """
-    least = math.inf
-    for i in range(len(spans.length)):
-        k = table.near[i]
-        d = minus(vector(places[k + 1]), vector(places[k]))
-        length = math.sqrt(dot(d, d))
-        unit = times(1.0 / length, d)
-        spans.length[i], least = length, min(least, length)
-        spans.unit[i, 0], spans.unit[i, 1], spans.unit[i, 2] = unit
-        spans.rate[i] = dot(unit, minus(vector(rates[k + 1]), vector(rates[k])))
-    for j in range(len(behind)):
-        before, after = vector(spans.unit[behind[j] - 1]), vector(spans.unit[behind[j]])
-        both, apart = plus(before, after), minus(after, before)
-        spans.angle[j] = 2.0 * math.atan2(math.sqrt(dot(both, both)), math.sqrt(dot(apart, apart)))
-    return least
+    return float(call("measure", table, behind, places, rates, spans))
 
 
-@compiled
-def path_of(spans: Spans, first: int, last: int) -> tuple[float, float]:
-    """Length (m) and its rate (m/s) of the path along spans ``first`` to ``last`` - 1."""
-    path = path_rate = 0.0
-    for i in range(first, last):
-        path += spans.length[i]
-        path_rate += spans.rate[i]
-    return path, path_rate
-
-
-@compiled
 def slide(table: RopeTable, drums: Drums, spans: Spans) -> None:
     """Speeds of the ropes over the pulleys, and exponents of their friction."""
-    for rope in range(len(table.starts)):
-        first, last = table.starts[rope], table.ends[rope]
-        path, path_rate = path_of(spans, first, last)
-        natural, winding = drums.natural[rope], drums.winding[rope]
-        beyond, rate_beyond = path, path_rate
-        for i in range(first, last):
-            j = table.pulley[i]
-            if i > first:
-                part = beyond / path
-                moved = (rate_beyond - part * path_rate) * natural / path
-                speed = drums.inflow[rope] + winding * part - moved
-                spans.speed[j], spans.exponent[j] = speed, math.tanh(speed / table.slip_speed[j])
-            beyond -= spans.length[i]
-            rate_beyond -= spans.rate[i]
+    call("slide", table, drums, spans)
 
 
-@compiled
 def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> None:
     """Tensions of all spans, whose speeds are known."""
-    for rope in range(len(table.starts)):
-        first, last = table.starts[rope], table.ends[rope]
-        path, path_rate = path_of(spans, first, last)
-        natural, winding = drums.natural[rope], drums.winding[rope]
-        log = most = 0.0
-        for i in range(first, last):
-            if i > first:
-                j = table.pulley[i]
-                log += spans.exponent[j] * log_decays[j]
-                most = max(most, log)
-            spans.share[i] = log
-        mean = 0.0
-        for i in range(first, last):
-            spans.share[i] = math.exp(spans.share[i] - most)
-            mean += spans.share[i] * spans.length[i] / path
-        tension = table.alive[rope] * _tension(table, rope, path, path_rate, natural, winding)
-        for i in range(first, last):
-            spans.share[i] /= mean
-            spans.tension[i] = tension * spans.share[i]
+    call("tighten", table, drums, log_decays, spans)
 
 
-@compiled
 def of_ropes(table: RopeTable, drums: Drums, spans: Spans) -> Array:
     """Of ropes whose spans are known, shape (6, ropes): paths and their rates, strains and theirs,
     forces before slack and mean tensions.
     """
     out = np.zeros((6, len(table.starts)))
-    for rope in range(len(table.starts)):
-        path, path_rate = path_of(spans, table.starts[rope], table.ends[rope])
-        natural, winding = drums.natural[rope], drums.winding[rope]
-        out[0, rope], out[1, rope], out[2, rope] = path, path_rate, path / natural - 1.0
-        out[3, rope] = (path_rate + path / natural * winding) / natural
-        out[4, rope] = force_of(table, rope, path, path_rate, natural, winding)
-        tension = _tension(table, rope, path, path_rate, natural, winding)
-        out[5, rope] = table.alive[rope] * tension
+    call("of_ropes", table, drums, spans, out)
     return out
-
-
-@compiled
-def force_of(
-    table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
-) -> float:
-    """Elastic and viscous force of a rope before slack."""
-    strain_rate = (path_rate + path / natural * winding) / natural
-    stretch: float = path / natural - 1.0 + table.material[rope, 1] * strain_rate
-    return stretch * float(table.material[rope, 0])
-
-
-@compiled
-def _tension(
-    table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
-) -> float:
-    force, width = force_of(table, rope, path, path_rate, natural, winding), table.material[rope, 2]
-    smooth: float = width * math.log1p(math.exp(max(-abs(force) / width, -200.0)))
-    return max(force, 0.0) + smooth
 
 
 # Derivatives of the cable's forces after positions and velocities of its points.
@@ -248,9 +163,6 @@ def _tension(
 # negative); its derivative is taken as zero there, the mean of both sides.
 
 
-STRAIGHT = 1e-7
-"""Sine of the angle between the pulls below which its derivative is taken as zero: far above the
-rounding of unit vectors (1e-16), far below the angles of any path that bends."""
 PASSING = 2e-4
 """Slope of a pulley's friction over that at rest below which Newton's tangent does without it: more
 than 0.9999 of the friction acts, and the rope's speed no longer changes it."""
@@ -276,29 +188,11 @@ def with_law_slopes(
     return np.asarray(slopes + np.where(np.abs(more) * slip_speed > passing, more, 0.0))
 
 
-@compiled
-def _turns(table: RopeTable, slopes: Array, span: int) -> bool:
-    """Whether the friction of the pulley before a span changes with speed."""
-    return bool(table.pulley[span] >= 0 and slopes[table.pulley[span]] != 0.0)
-
-
-@compiled
 def factors_needed(table: RopeTable, slopes: Array) -> int:
     """Number of factors that ``tension_changes`` finds."""
-    count = 0
-    for rope in range(len(table.starts)):
-        if table.alive[rope] > 0.0:
-            own, begun = 0, False
-            for b in range(table.starts[rope] + 1, table.ends[rope]):
-                begun = begun and table.felt[b - 1] == 0
-                if _turns(table, slopes, b):
-                    own += not begun
-                    begun = True
-            count += own + 1 + (own > 0)
-    return count
+    return int(call("factors_needed", table, slopes))
 
 
-@compiled
 def tension_changes(
     table: RopeTable,
     drums: Drums,
@@ -326,80 +220,7 @@ def tension_changes(
     which no span is felt change the same ones, and have one factor; their shares of the path go to
     the last factor of the rope.
     """
-    n = len(spans.length)
-    swing = np.empty((n, 3))
-    for i in range(n):
-        k = table.near[i]
-        moving = minus(vector(velocities[k + 1]), vector(velocities[k]))
-        aside = minus(moving, times(spans.rate[i], vector(spans.unit[i])))
-        for c in range(3):
-            swing[i, c] = aside[c] / spans.length[i]
-    row = 0
-    for rope in range(len(table.starts)):
-        if table.alive[rope] == 0.0:
-            continue
-        first, last = table.starts[rope], table.ends[rope]
-        path, path_rate = path_of(spans, first, last)
-        natural, winding = drums.natural[rope], drums.winding[rope]
-        force = force_of(table, rope, path, path_rate, natural, winding)
-        slack = 0.5 + 0.5 * math.tanh(0.5 * force / table.material[rope, 2])
-        elastic = table.material[rope, 0] / natural * slack
-        viscous = elastic * table.material[rope, 1]
-        own = by_place * left[rope]
-        stretched = own * (elastic + viscous * winding / natural) + by_rate * viscous
-        for i in range(first, last):
-            pulls[row, i] = spans.share[i]
-            put(changes[row, i], times(stretched, vector(spans.unit[i])))
-            put(changes[row, i], times(own * viscous, vector(swing[i])))
-        row += 1
-        ratio, turned, begun = natural / path, False, False
-        steadily = winding + ratio * path_rate
-        part, part_rate, tail = path, path_rate, path
-        longer = np.zeros((last - first, 3))
-        for b in range(first + 1, last):
-            j = table.pulley[b]
-            part -= spans.length[b - 1]
-            part_rate -= spans.rate[b - 1]
-            tail -= spans.share[b - 1] * spans.length[b - 1]
-            if begun and table.felt[b - 1] > 0:
-                row, begun = row + 1, False
-            if not _turns(table, slopes, b):
-                continue
-            felt = log_decays[j] * slopes[j]
-            share = part / path
-            for i in range(first, last):
-                here = 1.0 if i >= b else 0.0
-                rate_part = -ratio * felt * (here - share)
-                length_part = felt * (
-                    steadily / path * (here - share)
-                    + ratio / path * (part_rate - share * path_rate)
-                )
-                change = plus(
-                    times(by_place * length_part + by_rate * rate_part, vector(spans.unit[i])),
-                    times(by_place * rate_part, vector(swing[i])),
-                )
-                if i >= b and not begun:
-                    pulls[row, i] = spans.tension[i]
-                put(changes[row, i], change)
-                put(longer[i - first], times(-tail / path, change))
-            turned = begun = True
-            before, after = vector(spans.unit[b - 1]), vector(spans.unit[b])
-            cosine = dot(before, after)
-            aside = minus(after, times(cosine, before))
-            sine = math.sqrt(dot(aside, aside))
-            if sine > STRAIGHT:
-                bent = by_place * spans.exponent[j] * log_slopes[j] / sine
-                ahead = times(bent / spans.length[b - 1], aside)
-                back = times(bent / spans.length[b], minus(before, times(cosine, after)))
-                put(changes[row, b - 1], ahead)
-                put(changes[row, b], back)
-                put(longer[b - 1 - first], times(-tail / path, ahead))
-                put(longer[b - first], times(-tail / path, back))
-        if turned:
-            row += begun
-            for i in range(first, last):
-                stretch = by_place * (1.0 - spans.share[i]) / path
-                pulls[row, i] = spans.tension[i]
-                put(changes[row, i], times(stretch, vector(spans.unit[i])))
-                put(changes[row, i], vector(longer[i - first]))
-            row += 1
+    call(
+        "tension_changes", table, drums, log_decays, log_slopes, slopes, spans, velocities, left,
+        by_place, by_rate, pulls, changes,
+    )  # fmt: skip

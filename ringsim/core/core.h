@@ -1,0 +1,220 @@
+/* What all files of the core share: numbers, tables that Python hands over, vectors.
+
+   A table is a NamedTuple of ringsim.frame or ringsim.core in the order of its fields: an array is
+   its address, its length and the numbers of each of its rows; see ringsim/core/library.py. */
+
+#ifndef RINGSIM_CORE_H
+#define RINGSIM_CORE_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+typedef int64_t I;
+typedef double D;
+
+typedef struct {
+    D *at;
+    I n, each;
+} Reals;
+
+typedef struct {
+    I *at;
+    I n, each;
+} Ints;
+
+/* Four numbers, on which arithmetic works as on one.  Memory of numpy is not aligned to all four. */
+enum { LANES = 4 };
+typedef D V __attribute__((vector_size(32), aligned(8)));
+typedef I Mask __attribute__((vector_size(32), aligned(8)));
+
+static inline V all(D x) { return (V){x, x, x, x}; }
+
+static inline bool any(Mask m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
+
+static inline V take(const D *from) { return *(const V *)from; }
+
+static inline void put(D *to, V x) { *(V *)to = x; }
+
+static inline V size_of(V x) {
+    const Mask rest = {INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX};
+    return (V)((Mask)x & rest);
+}
+
+#define REAL D
+#define VEC Vec
+#define MAT Mat
+#define OF(name) name
+#include "vectors.h"
+#undef REAL
+#undef VEC
+#undef MAT
+#undef OF
+#define REAL V
+#define VEC Vec4
+#define MAT Mat4
+#define OF(name) name##4
+#include "vectors.h"
+#undef REAL
+#undef VEC
+#undef MAT
+#undef OF
+
+static inline Vec vector(const D *a) { return (Vec){a[0], a[1], a[2]}; }
+
+static inline Mat matrix(const D *a) {
+    Mat found;
+    memcpy(found.a, a, sizeof found.a);
+    return found;
+}
+
+/* The larger of two numbers; none if the first one is none. */
+static inline D larger(D a, D b) { return a < b ? b : a; }
+
+static inline void store(D *to, const Mat *m) { memcpy(to, m->a, sizeof m->a); }
+
+static inline void store_vector(D *to, Vec a) { to[0] = a.x, to[1] = a.y, to[2] = a.z; }
+
+static inline void add_vector(D *to, Vec a) { to[0] += a.x, to[1] += a.y, to[2] += a.z; }
+
+/* A force and a moment on the six unknowns of a frame. */
+static inline void push(D *to, Vec force, Vec moment) {
+    add_vector(to, force);
+    add_vector(to + 3, moment);
+}
+
+Mat turned(Vec a);
+Mat turned_about_z(D angle);
+Vec rotation_vector(const Mat *m);
+Mat4 turned4(Vec4 a);
+Vec4 rotation_vector4(const Mat4 *m);
+
+/* ringsim.frame.mesh.Mesh */
+typedef struct {
+    Ints frame, angle;
+    Reals axes;
+    Ints point;
+    Reals length, stiffness, mass, tau;
+    Ints point_frame;
+    Reals point_arm, point_mass;
+    Ints home, angle_home, part, local, angle_local, frame_local, gone, size, spots, parent, up,
+        fixed, craft;
+    I unknowns;
+} Mesh;
+
+/* ringsim.frame.kernels */
+typedef struct {
+    Reals place, axes, angle;
+} Pose;
+
+typedef struct {
+    Reals now, before;
+    D lead;
+} Strains;
+
+/* ringsim.frame.elimination.Fronts */
+typedef struct {
+    Reals whole;
+    Ints panels;
+    Reals inverse;
+    I columns;
+} Fronts;
+
+/* ringsim.frame.laws */
+typedef struct {
+    Ints code, laws;
+    Reals rows;
+} Tape;
+
+typedef struct {
+    Tape tape;
+    Ints own;
+    Reals sense;
+    I soft;
+} Acting;
+
+/* ringsim.frame.springs.Web */
+typedef struct {
+    Tape tape;
+    Ints first, second;
+    Reals natural;
+    Ints ends, spots;
+    D hub_mass;
+} Web;
+
+/* ringsim.frame.state */
+typedef struct {
+    D alpha_m, alpha_f, beta, gamma;
+} Coefficients;
+
+typedef struct {
+    Reals place, rate, acceleration, auxiliary;
+} Followed;
+
+typedef struct {
+    Ints cuts, ends, hung, top, low;
+    Reals reach;
+    D stiffness;
+    Reals damping;
+    I weighs;
+    Reals gravity;
+} Held;
+
+/* ringsim.frame.cables */
+typedef struct {
+    Ints frame;
+    Reals arm, axes, swung;
+    Ints angle;
+    Reals share;
+    Ints span, near, front, local;
+} Lines;
+
+typedef struct {
+    Reals whole, swung, axis;
+} Arms;
+
+typedef struct {
+    Tape decays, slopes;
+    I moves, loads, most;
+    D least_tension, solved;
+} Laws;
+
+/* ringsim.core.tension */
+typedef struct {
+    Ints starts, ends, near, pulley, felt;
+    Reals alive, material, slip_speed;
+} Ropes;
+
+typedef struct {
+    Reals natural, winding, inflow;
+} Drums;
+
+typedef struct {
+    Reals length, rate, unit, angle, tension, share, exponent, speed;
+} Spans;
+
+static inline Mat axes_of(const Pose *pose, I frame) { return matrix(pose->axes.at + 9 * frame); }
+
+static inline Vec place_of(const Pose *pose, I frame) { return vector(pose->place.at + 3 * frame); }
+
+static inline D *front_of(const Fronts *fronts, I number) {
+    return fronts->whole.at + number * fronts->whole.each;
+}
+
+static inline D *row_of(const Tape *tape, I row) { return tape->rows.at + row * tape->rows.each; }
+
+void play(const Tape *tape);
+void place_points(const Mesh *mesh, const Pose *pose, D *out, I n_out);
+void add_forces(const Mesh *mesh, const Pose *pose, const D *points, I n_points,
+                const D *accelerations, I n_accelerations, const Strains *strains, D *loads,
+                I n_loads, D *g, I n_g);
+void begin_tangent(const Mesh *mesh, const Pose *pose, const D *points, I n_points,
+                   const D *accelerations, I n_accelerations, const D *loads, I n_loads, D lead,
+                   D by_place, const Fronts *fronts);
+void place_lines(const Lines *lines, const Pose *pose, const Arms *arms, D *out);
+void push_joints(const Acting *acting, const D *angles, const D *rates, const Mesh *mesh, D *g);
+void add_joint_slopes(const Acting *acting, const D *angles, const D *rates, D by_rate,
+                      const Mesh *mesh, const Fronts *fronts);
+
+#endif

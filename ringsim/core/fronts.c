@@ -1,0 +1,230 @@
+/* The tangent of all unknowns, eliminated front by front; see ringsim/frame/elimination.py. */
+
+#include "core.h"
+
+/* Pivot over the sum of its row's entries in the front.  Elimination without exchange loses as many
+   digits; Newton renews what they spoil, but not without end. */
+static const D LEAST_PIVOT = 1e-9;
+/* Unknowns of a panel at most, and columns at a time of what it leaves. */
+enum { PANEL = 16, WIDE = 24, EIGHT = 8 };
+
+/* Invert a panel's own block of so many rows (Gauss and Jordan), on lanes that hold all its columns;
+   false if a pivot is too small beside the rest of its row. */
+static inline bool invert(const D *a, I columns, I gone, I left, D *out, const int lanes) {
+    V r[PANEL][PANEL / LANES];
+    bool sound = true;
+    for (I i = 0; i < gone; i++)
+        for (int q = 0; q < lanes; q++) r[i][q] = take(a + i * columns + LANES * q);
+    const V first = {0.0, 1.0, 2.0, 3.0};
+    for (I k = 0; k < gone; k++) {
+        V sums = all(0.0);
+        I j = 0;
+        for (; j + LANES <= left; j += LANES) sums += size_of(take(a + k * columns + j));
+        D sum = (sums[0] + sums[2]) + (sums[1] + sums[3]);
+        for (; j < left; j++) sum += fabs(a[k * columns + j]);
+        D pivot = ((const D *)r[k])[k], column[PANEL];
+        sound &= fabs(pivot) > LEAST_PIVOT * sum;
+        for (I i = 0; i < gone; i++) column[i] = ((const D *)r[i])[k];
+        V inverse = all(1.0 / pivot);
+        V own[PANEL / LANES], other[PANEL / LANES];
+        for (int q = 0; q < lanes; q++) {
+            /* No single number is put into a row: loading all four would wait for it. */
+            Mask unit = first + (D)(LANES * q) == all((D)k);
+            other[q] = (V)(~unit & (Mask)all(1.0));
+            own[q] = (r[k][q] * other[q] + (1.0 - other[q])) * inverse;
+        }
+        for (I i = 0; i < gone; i++) {
+            if (i == k) continue;
+            V by = all(column[i]);
+            for (int q = 0; q < lanes; q++) r[i][q] = r[i][q] * other[q] - by * own[q];
+        }
+        for (int q = 0; q < lanes; q++) r[k][q] = own[q];
+    }
+    for (I i = 0; i < gone; i++)
+        for (int q = 0; q < lanes; q++) put(out + PANEL * i + LANES * q, r[i][q]);
+    return sound;
+}
+
+/* Columns of a row that stays, less what the panel's rows take from them. */
+static inline void take_off(D *left, const D *row, const D *a, I columns, I gone, const D *share,
+                            const int lanes) {
+    V x[WIDE / LANES];
+    for (int q = 0; q < lanes; q++) x[q] = take(row + LANES * q);
+    for (I k = 0; k < gone; k++) {
+        V by = all(share[k]);
+        for (int q = 0; q < lanes; q++) x[q] -= by * take(a + k * columns + LANES * q);
+    }
+    for (int q = 0; q < lanes; q++) put(left + LANES * q, x[q]);
+}
+
+/* Eliminate the rows of a front that stay; those of its last panel are added to its parent. */
+static inline void reduce(D *a, I columns, I begin, I gone, I size, const D *inverse, const I *up,
+                          D *parent, const int lanes) {
+    I end = begin + gone;
+    const D *panel = a + begin * columns;
+    for (I i = end; i < size; i++) {
+        D *row = a + i * columns, share[PANEL], left[WIDE];
+        V low[PANEL / LANES];
+        for (int q = 0; q < lanes; q++) low[q] = all(0.0);
+        for (I k = 0; k < gone; k++) {
+            V by = all(row[begin + k]);
+            for (int q = 0; q < lanes; q++) low[q] += by * take(inverse + PANEL * k + LANES * q);
+        }
+        for (int q = 0; q < lanes; q++) put(share + LANES * q, low[q]);
+        for (I first = end; first < size; first += WIDE) {
+            I count = size - first < WIDE ? size - first : WIDE;
+            if (count > 2 * EIGHT)
+                take_off(left, row + first, panel + first, columns, gone, share, WIDE / LANES);
+            else if (count > EIGHT)
+                take_off(left, row + first, panel + first, columns, gone, share, 2 * EIGHT / LANES);
+            else
+                take_off(left, row + first, panel + first, columns, gone, share, EIGHT / LANES);
+            if (parent) {
+                D *to = parent + up[i] * columns;
+                for (I j = 0; j < count; j++) to[up[first + j]] += left[j];
+            } else
+                memcpy(row + first, left, (size_t)count * sizeof(D));
+        }
+        memcpy(row + begin, share, (size_t)gone * sizeof(D));
+    }
+}
+
+/* Eliminate all fronts, in place; false where a pivot is too small. */
+bool factor(const Mesh *mesh, const Fronts *fronts) {
+    bool sound = true;
+    I columns = fronts->columns;
+    for (I p = 0; p < fronts->panels.n; p++) {
+        const I *panel = fronts->panels.at + 3 * p;
+        I number = panel[0], begin = panel[1], gone = panel[2], size = mesh->size.at[number];
+        D *a = front_of(fronts, number), *inverse = fronts->inverse.at + PANEL * PANEL * p;
+        const I *spots = mesh->spots.at + number * mesh->spots.each;
+        for (I f = 0; f < mesh->fixed.n; f++)
+            for (I k = begin; k < begin + gone; k++)
+                if (spots[k] == mesh->fixed.at[f]) {
+                    for (I j = begin; j < size; j++) a[k * columns + j] = a[j * columns + k] = 0.0;
+                    a[k * columns + k] = 1.0;
+                }
+        D *own = a + begin * columns + begin;
+        bool small = gone <= 3 * LANES;
+        sound &= small ? invert(own, columns, gone, size - begin, inverse, 3)
+                       : invert(own, columns, gone, size - begin, inverse, 4);
+        if (begin + gone == size) continue;
+        bool last = begin + gone == mesh->gone.at[number];
+        D *parent = last ? front_of(fronts, mesh->parent.at[number]) : NULL;
+        const I *up = mesh->up.at + number * mesh->up.each;
+        if (small)
+            reduce(a, columns, begin, gone, size, inverse, up, parent, 3);
+        else
+            reduce(a, columns, begin, gone, size, inverse, up, parent, 4);
+    }
+    return sound;
+}
+
+/* Replace eight right-hand sides, whose rows are so far apart, by solutions. */
+static void solve_eight(const Mesh *mesh, const Fronts *fronts, D *x, I apart) {
+    I columns = fronts->columns;
+    V b[mesh->spots.each][2], known[PANEL][2];
+    for (I p = 0; p < fronts->panels.n; p++) {
+        const I *panel = fronts->panels.at + 3 * p;
+        I begin = panel[1], gone = panel[2], size = mesh->size.at[panel[0]];
+        const D *a = front_of(fronts, panel[0]);
+        const I *spots = mesh->spots.at + panel[0] * mesh->spots.each;
+        /* What other fronts have added to them: they do not move. */
+        for (I f = 0; f < mesh->fixed.n; f++) {
+            D *own = x + mesh->fixed.at[f] * apart;
+            put(own, all(0.0)), put(own + LANES, all(0.0));
+        }
+        for (I k = 0; k < gone; k++) {
+            const D *own = x + spots[begin + k] * apart;
+            known[k][0] = take(own), known[k][1] = take(own + LANES);
+        }
+        /* Two rows at once: a sum waits for the one before.  An odd last row is its own twin. */
+        for (I i = begin + gone; i < size; i += 2) {
+            I twin = i + 1 < size ? i + 1 : i;
+            D *one = x + spots[i] * apart, *other = x + spots[twin] * apart;
+            const D *of_one = a + i * columns + begin, *of_other = a + twin * columns + begin;
+            V p0 = take(one), p1 = take(one + LANES), q0 = take(other), q1 = take(other + LANES);
+            for (I k = 0; k < gone; k++) {
+                p0 -= of_one[k] * known[k][0], p1 -= of_one[k] * known[k][1];
+                q0 -= of_other[k] * known[k][0], q1 -= of_other[k] * known[k][1];
+            }
+            put(one, p0), put(one + LANES, p1);
+            if (twin > i) put(other, q0), put(other + LANES, q1);
+        }
+    }
+    for (I p = fronts->panels.n - 1; p >= 0; p--) {
+        const I *panel = fronts->panels.at + 3 * p;
+        I begin = panel[1], gone = panel[2], size = mesh->size.at[panel[0]], end = begin + gone;
+        const D *a = front_of(fronts, panel[0]), *inverse = fronts->inverse.at + PANEL * PANEL * p;
+        const I *spots = mesh->spots.at + panel[0] * mesh->spots.each;
+        for (I k = begin; k < size; k++) {
+            const D *own = x + spots[k] * apart;
+            b[k][0] = take(own), b[k][1] = take(own + LANES);
+        }
+        for (I i = 0; i < gone; i += 2) {
+            I twin = i + 1 < gone ? i + 1 : i;
+            const D *of_one = a + (begin + i) * columns, *of_other = a + (begin + twin) * columns;
+            V p0 = b[begin + i][0], p1 = b[begin + i][1], q0 = b[begin + twin][0], q1 = b[begin + twin][1];
+            for (I k = end; k < size; k++) {
+                p0 -= of_one[k] * b[k][0], p1 -= of_one[k] * b[k][1];
+                q0 -= of_other[k] * b[k][0], q1 -= of_other[k] * b[k][1];
+            }
+            known[i][0] = p0, known[i][1] = p1;
+            if (twin > i) known[twin][0] = q0, known[twin][1] = q1;
+        }
+        for (I i = 0; i < gone; i++) {
+            V p0 = all(0.0), p1 = all(0.0);
+            for (I k = 0; k < gone; k++) {
+                D share = inverse[PANEL * i + k];
+                p0 += share * known[k][0], p1 += share * known[k][1];
+            }
+            D *own = x + spots[begin + i] * apart;
+            put(own, p0), put(own + LANES, p1);
+        }
+    }
+}
+
+/* Replace right-hand sides, shape (unknowns, a multiple of eight), by solutions. */
+void solve(const Mesh *mesh, const Fronts *fronts, D *x, I n_x) {
+    I apart = n_x / mesh->unknowns;
+    for (I column = 0; column < apart; column += EIGHT) solve_eight(mesh, fronts, x + column, apart);
+}
+
+static inline D product(const D *a, const D *b, I n) {
+    V low = all(0.0), high = all(0.0);
+    I k = 0;
+    for (; k + EIGHT <= n; k += EIGHT) {
+        low += take(a + k) * take(b + k);
+        high += take(a + k + LANES) * take(b + k + LANES);
+    }
+    low += high;
+    D sum = (low[0] + low[2]) + (low[1] + low[3]);
+    for (; k < n; k++) sum += a[k] * b[k];
+    return sum;
+}
+
+/* The same of one right-hand side, shape (unknowns,). */
+void solve_one(const Mesh *mesh, const Fronts *fronts, D *x, I n_x) {
+    (void)n_x;
+    I columns = fronts->columns;
+    D b[mesh->spots.each + 1], known[PANEL];
+    for (I p = 0; p < fronts->panels.n; p++) {
+        const I *panel = fronts->panels.at + 3 * p;
+        I begin = panel[1], gone = panel[2], size = mesh->size.at[panel[0]];
+        const D *a = front_of(fronts, panel[0]) + begin;
+        const I *spots = mesh->spots.at + panel[0] * mesh->spots.each;
+        for (I f = 0; f < mesh->fixed.n; f++) x[mesh->fixed.at[f]] = 0.0;
+        for (I k = 0; k < gone; k++) known[k] = x[spots[begin + k]];
+        for (I i = begin + gone; i < size; i++) x[spots[i]] -= product(a + i * columns, known, gone);
+    }
+    for (I p = fronts->panels.n - 1; p >= 0; p--) {
+        const I *panel = fronts->panels.at + 3 * p;
+        I begin = panel[1], gone = panel[2], end = begin + gone, kept = mesh->size.at[panel[0]] - end;
+        const D *a = front_of(fronts, panel[0]), *inverse = fronts->inverse.at + PANEL * PANEL * p;
+        const I *spots = mesh->spots.at + panel[0] * mesh->spots.each;
+        for (I k = 0; k < kept; k++) b[k] = x[spots[end + k]];
+        for (I i = 0; i < gone; i++)
+            known[i] = x[spots[begin + i]] - product(a + (begin + i) * columns + end, b, kept);
+        for (I i = 0; i < gone; i++) x[spots[begin + i]] = product(inverse + PANEL * i, known, gone);
+    }
+}

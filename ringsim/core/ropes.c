@@ -1,0 +1,474 @@
+/* The law of the ropes: tensions of all spans, and how they change; see ringsim/core/tension.py. */
+
+#include "core.h"
+
+/* Sine of the angle between the pulls below which its derivative is taken as zero: far above the
+   rounding of unit vectors (1e-16), far below the angles of any path that bends. */
+static const D STRAIGHT = 1e-7;
+
+/* Lengths, rates, directions and angles of places and rates of the points; returns the least
+   length, m. */
+D measure(const Ropes *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
+          I n_rates, const Spans *spans) {
+    (void)n_places, (void)n_rates;
+    D least = INFINITY;
+    for (I i = 0; i < spans->length.n; i++) {
+        I k = 3 * ropes->near.at[i];
+        Vec apart = minus(vector(places + k + 3), vector(places + k));
+        D length = sqrt(dot(apart, apart));
+        Vec unit = times(1.0 / length, apart);
+        spans->length.at[i] = length;
+        if (length < least || isnan(length)) least = length;
+        store_vector(spans->unit.at + 3 * i, unit);
+        spans->rate.at[i] = dot(unit, minus(vector(rates + k + 3), vector(rates + k)));
+    }
+    for (I j = 0; j < pulleys; j++) {
+        Vec before = vector(spans->unit.at + 3 * (behind[j] - 1)), after = vector(spans->unit.at + 3 * behind[j]);
+        Vec both = plus(before, after), apart = minus(after, before);
+        spans->angle.at[j] = 2.0 * atan2(sqrt(dot(both, both)), sqrt(dot(apart, apart)));
+    }
+    return least;
+}
+
+/* Length (m) and its rate (m/s) of the path along the spans of a rope. */
+typedef struct {
+    D length, rate;
+} Path;
+
+static Path path_of(const Ropes *ropes, const Spans *spans, I rope) {
+    Path found = {0.0, 0.0};
+    for (I i = ropes->starts.at[rope]; i < ropes->ends.at[rope]; i++) {
+        found.length += spans->length.at[i];
+        found.rate += spans->rate.at[i];
+    }
+    return found;
+}
+
+/* Speeds of the ropes over the pulleys, and exponents of their friction. */
+void slide(const Ropes *ropes, const Drums *drums, const Spans *spans) {
+    for (I rope = 0; rope < ropes->starts.n; rope++) {
+        Path path = path_of(ropes, spans, rope);
+        D natural = drums->natural.at[rope], beyond = path.length, rate_beyond = path.rate;
+        for (I i = ropes->starts.at[rope]; i < ropes->ends.at[rope]; i++) {
+            if (i > ropes->starts.at[rope]) {
+                I j = ropes->pulley.at[i];
+                D part = beyond / path.length;
+                D moved = (rate_beyond - part * path.rate) * natural / path.length;
+                D speed = drums->inflow.at[rope] + drums->winding.at[rope] * part - moved;
+                if (j >= 0) {
+                    spans->speed.at[j] = speed;
+                    spans->exponent.at[j] = tanh(speed / ropes->slip_speed.at[j]);
+                }
+            }
+            beyond -= spans->length.at[i];
+            rate_beyond -= spans->rate.at[i];
+        }
+    }
+}
+
+/* Elastic and viscous force of a rope before slack. */
+static D force_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
+    const D *material = ropes->material.at + 3 * rope;
+    D natural = drums->natural.at[rope], ratio = path.length / natural;
+    D strain_rate = (path.rate + ratio * drums->winding.at[rope]) / natural;
+    D stretch = ratio - 1.0 + material[1] * strain_rate;
+    return stretch * material[0];
+}
+
+static D tension_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
+    D force = force_of(ropes, drums, rope, path), width = ropes->material.at[3 * rope + 2];
+    return larger(force, 0.0) + width * log1p(exp(larger(-fabs(force) / width, -200.0)));
+}
+
+/* Tensions of all spans, whose speeds are known. */
+void tighten(const Ropes *ropes, const Drums *drums, const D *log_decays, I pulleys,
+             const Spans *spans) {
+    (void)pulleys;
+    D *share = spans->share.at;
+    for (I rope = 0; rope < ropes->starts.n; rope++) {
+        I first = ropes->starts.at[rope], last = ropes->ends.at[rope];
+        Path path = path_of(ropes, spans, rope);
+        D log = 0.0, most = 0.0, mean = 0.0;
+        for (I i = first; i < last; i++) {
+            if (i > first && ropes->pulley.at[i] >= 0) {
+                I j = ropes->pulley.at[i];
+                log += spans->exponent.at[j] * log_decays[j];
+                if (log > most) most = log;
+            }
+            share[i] = log;
+        }
+        for (I i = first; i < last; i++) {
+            share[i] = exp(share[i] - most);
+            mean += share[i] * spans->length.at[i] / path.length;
+        }
+        D tension = ropes->alive.at[rope] * tension_of(ropes, drums, rope, path);
+        for (I i = first; i < last; i++) {
+            share[i] /= mean;
+            spans->tension.at[i] = tension * share[i];
+        }
+    }
+}
+
+/* Of ropes whose spans are known, shape (6, ropes): paths and their rates, strains and theirs,
+   forces before slack and mean tensions. */
+void of_ropes(const Ropes *ropes, const Drums *drums, const Spans *spans, D *out, I n_out) {
+    (void)n_out;
+    I count = ropes->starts.n;
+    for (I rope = 0; rope < count; rope++) {
+        Path path = path_of(ropes, spans, rope);
+        D natural = drums->natural.at[rope], winding = drums->winding.at[rope];
+        out[rope] = path.length, out[count + rope] = path.rate;
+        out[2 * count + rope] = path.length / natural - 1.0;
+        out[3 * count + rope] = (path.rate + path.length / natural * winding) / natural;
+        out[4 * count + rope] = force_of(ropes, drums, rope, path);
+        out[5 * count + rope] = ropes->alive.at[rope] * tension_of(ropes, drums, rope, path);
+    }
+}
+
+/* Let laws see the pulleys (ringsim.cable.friction.Pulleys). */
+void show(const I *behind, I pulleys, const Spans *spans, const Laws *laws, const Tape *tape) {
+    D *angle = row_of(tape, 0), *speed = row_of(tape, 1), *tension = row_of(tape, 2);
+    for (I j = 0; j < pulleys; j++) {
+        D both = 0.5 * (spans->tension.at[behind[j] - 1] + spans->tension.at[behind[j]]);
+        angle[j] = spans->angle.at[j], speed[j] = fabs(spans->speed.at[j]);
+        tension[j] = larger(both, laws->least_tension);
+    }
+}
+
+/* Rows of the results of decays and of slopes, behind what laws see. */
+enum { DECAY = 3, BY_ANGLE = 3 };
+
+/* Spans, with their tensions, at places and rates of the points; returns the least length, NaN if no
+   tensions go with the friction. */
+D pull_tight(const Ropes *ropes, const I *behind, I pulleys, const Drums *drums, const Laws *laws,
+             const D *places, I n_places, const D *rates, I n_rates, const Spans *spans) {
+    D least = measure(ropes, behind, pulleys, places, n_places, rates, n_rates, spans);
+    D *decays = row_of(&laws->decays, DECAY), before[pulleys + 1];
+    slide(ropes, drums, spans);
+    if (!laws->loads) {
+        show(behind, pulleys, spans, laws, &laws->decays);
+        play(&laws->decays);
+        tighten(ropes, drums, decays, pulleys, spans);
+        return least;
+    }
+    memset(decays, 0, (size_t)pulleys * sizeof(D));
+    memset(before, 0, sizeof before);
+    tighten(ropes, drums, decays, pulleys, spans);
+    for (I n = 0; n < laws->most; n++) {
+        show(behind, pulleys, spans, laws, &laws->decays);
+        play(&laws->decays);
+        tighten(ropes, drums, decays, pulleys, spans);
+        D change = 0.0;
+        for (I j = 0; j < pulleys; j++) {
+            D own = fabs(decays[j] - before[j]);
+            if (own > change || isnan(own)) change = own;
+            before[j] = decays[j];
+        }
+        if (change < laws->solved) return least;
+    }
+    return NAN;
+}
+
+/* Whether the friction of the pulley before a span changes with speed. */
+static bool turns(const Ropes *ropes, const D *slopes, I span) {
+    return ropes->pulley.at[span] >= 0 && slopes[ropes->pulley.at[span]] != 0.0;
+}
+
+/* Number of factors that tension_changes finds. */
+I factors_needed(const Ropes *ropes, const D *slopes, I pulleys) {
+    (void)pulleys;
+    I count = 0;
+    for (I rope = 0; rope < ropes->starts.n; rope++) {
+        if (!(ropes->alive.at[rope] > 0.0)) continue;
+        I own = 0;
+        bool begun = false;
+        for (I b = ropes->starts.at[rope] + 1; b < ropes->ends.at[rope]; b++) {
+            begun = begun && ropes->felt.at[b - 1] == 0;
+            if (turns(ropes, slopes, b)) {
+                own += !begun;
+                begun = true;
+            }
+        }
+        count += own + 1 + (own > 0);
+    }
+    return count;
+}
+
+/* A pulley's friction changes all spans behind it, less their share of the path: how it changes with
+   the differences of the points, into the changes of a row, and by it the share of all. */
+typedef struct {
+    D by_place, by_rate, ratio, steadily, path, path_rate;
+} Rope;
+
+static void by_speed(const Rope *rope, D felt, D part, D part_rate, D tail, I first, I last, I b,
+                     const Spans *spans, const D *swing, D *changes, D *longer) {
+    D share = part / rope->path;
+    for (I i = first; i < last; i++) {
+        D here = i >= b ? 1.0 : 0.0, rate_part = -rope->ratio * felt * (here - share);
+        D length_part = felt * (rope->steadily / rope->path * (here - share) +
+                                rope->ratio / rope->path * (part_rate - share * rope->path_rate));
+        Vec change = plus(times(rope->by_place * length_part + rope->by_rate * rate_part,
+                                vector(spans->unit.at + 3 * i)),
+                          times(rope->by_place * rate_part, vector(swing + 3 * i)));
+        add_vector(changes + 3 * i, change);
+        add_vector(longer + 3 * (i - first), times(-tail / rope->path, change));
+    }
+}
+
+static void by_angle(const Rope *rope, D slope, D tail, I first, I b, const Spans *spans, D *changes,
+                     D *longer) {
+    Vec before = vector(spans->unit.at + 3 * (b - 1)), after = vector(spans->unit.at + 3 * b);
+    D cosine = dot(before, after);
+    Vec aside = minus(after, times(cosine, before));
+    D sine = sqrt(dot(aside, aside));
+    if (sine <= STRAIGHT) return;
+    D bent = rope->by_place * slope / sine;
+    Vec ahead = times(bent / spans->length.at[b - 1], aside);
+    Vec back = times(bent / spans->length.at[b], minus(before, times(cosine, after)));
+    add_vector(changes + 3 * (b - 1), ahead);
+    add_vector(changes + 3 * b, back);
+    add_vector(longer + 3 * (b - 1 - first), times(-tail / rope->path, ahead));
+    add_vector(longer + 3 * (b - first), times(-tail / rope->path, back));
+}
+
+/* Changes of tension in factors: tensions of the spans, shape (k, spans), and what they change with,
+   after the differences of the points, (k, spans, 3); both zeros before.  See
+   ringsim.core.tension.tension_changes. */
+void tension_changes(const Ropes *ropes, const Drums *drums, const D *log_decays, I n_decays,
+                     const D *log_slopes, I n_log_slopes, const D *slopes, I n_slopes,
+                     const Spans *spans, const D *velocities, I n_velocities, const D *left, I n_left,
+                     D by_place, D by_rate, D *pulls, I n_pulls, D *changes, I n_changes) {
+    (void)n_decays, (void)n_log_slopes, (void)n_slopes, (void)n_velocities, (void)n_left,
+        (void)n_pulls, (void)n_changes;
+    I n = spans->length.n;
+    D swing[3 * n + 1], longer[3 * n + 1];
+    for (I i = 0; i < n; i++) {
+        const D *near = velocities + 3 * ropes->near.at[i];
+        Vec moving = minus(vector(near + 3), vector(near));
+        Vec aside = minus(moving, times(spans->rate.at[i], vector(spans->unit.at + 3 * i)));
+        D length = spans->length.at[i];
+        store_vector(swing + 3 * i, (Vec){aside.x / length, aside.y / length, aside.z / length});
+    }
+    I row = 0;
+    for (I r = 0; r < ropes->starts.n; r++) {
+        if (ropes->alive.at[r] == 0.0) continue;
+        I first = ropes->starts.at[r], last = ropes->ends.at[r];
+        Path path = path_of(ropes, spans, r);
+        const D *material = ropes->material.at + 3 * r;
+        D natural = drums->natural.at[r], winding = drums->winding.at[r];
+        D slack = 0.5 + 0.5 * tanh(0.5 * force_of(ropes, drums, r, path) / material[2]);
+        D elastic = material[0] / natural * slack, viscous = elastic * material[1];
+        D own = by_place * left[r];
+        D stretched = own * (elastic + viscous * winding / natural) + by_rate * viscous;
+        for (I i = first; i < last; i++) {
+            D *to = changes + 3 * (row * n + i);
+            pulls[row * n + i] = spans->share.at[i];
+            add_vector(to, times(stretched, vector(spans->unit.at + 3 * i)));
+            add_vector(to, times(own * viscous, vector(swing + 3 * i)));
+        }
+        row++;
+        Rope rope = {by_place, by_rate, natural / path.length, 0.0, path.length, path.rate};
+        rope.steadily = winding + rope.ratio * path.rate;
+        bool turned = false, begun = false;
+        D part = path.length, part_rate = path.rate, tail = path.length;
+        memset(longer, 0, (size_t)(3 * (last - first)) * sizeof(D));
+        for (I b = first + 1; b < last; b++) {
+            part -= spans->length.at[b - 1];
+            part_rate -= spans->rate.at[b - 1];
+            tail -= spans->share.at[b - 1] * spans->length.at[b - 1];
+            if (begun && ropes->felt.at[b - 1] > 0) row++, begun = false;
+            if (!turns(ropes, slopes, b)) continue;
+            I j = ropes->pulley.at[b];
+            D *to = changes + 3 * row * n;
+            if (!begun)
+                for (I i = b; i < last; i++) pulls[row * n + i] = spans->tension.at[i];
+            by_speed(&rope, log_decays[j] * slopes[j], part, part_rate, tail, first, last, b, spans,
+                     swing, to, longer);
+            by_angle(&rope, spans->exponent.at[j] * log_slopes[j], tail, first, b, spans, to, longer);
+            turned = begun = true;
+        }
+        if (!turned) continue;
+        row += begun;
+        for (I i = first; i < last; i++) {
+            D *to = changes + 3 * (row * n + i);
+            D stretch = by_place * (1.0 - spans->share.at[i]) / path.length;
+            pulls[row * n + i] = spans->tension.at[i];
+            add_vector(to, times(stretch, vector(spans->unit.at + 3 * i)));
+            add_vector(to, vector(longer + 3 * (i - first)));
+        }
+        row++;
+    }
+}
+
+/* The cables on frames. */
+
+/* Arms and places of all points of the paths. */
+void place_lines(const Lines *lines, const Pose *pose, const Arms *arms, D *out) {
+    for (I n = 0; n < lines->frame.n; n++) {
+        I frame = lines->frame.at[n], angle = lines->angle.at[n];
+        Mat axes = axes_of(pose, frame);
+        Vec arm = turn(&axes, vector(lines->arm.at + 3 * n)), swung = {0}, axis = {0};
+        if (angle >= 0) {
+            Mat drawn = matrix(lines->axes.at + 9 * n), own = mul(&axes, &drawn);
+            Mat by = turned_about_z(lines->share.at[n] * pose->angle.at[angle]);
+            swung = turn(&own, turn(&by, vector(lines->swung.at + 3 * n)));
+            axis = times(lines->share.at[n], (Vec){own.a[2], own.a[5], own.a[8]});
+        }
+        arm = plus(arm, swung);
+        store_vector(arms->whole.at + 3 * n, arm);
+        store_vector(arms->swung.at + 3 * n, swung);
+        store_vector(arms->axis.at + 3 * n, axis);
+        store_vector(out + 3 * n, plus(place_of(pose, frame), arm));
+    }
+}
+
+/* Add what forces on all points, shape (count, points, 3), do to the unknowns, (unknowns, columns),
+   from the first column on. */
+static void pull_lines(const Lines *lines, const Mesh *mesh, const Arms *arms, const D *forces,
+                       I count, D *out, I columns, I first) {
+    I points = lines->frame.n;
+    for (I n = 0; n < points; n++) {
+        D *to = out + mesh->home.at[lines->frame.at[n]] * columns + first;
+        Vec arm = vector(arms->whole.at + 3 * n);
+        Vec by_turn = cross(vector(arms->axis.at + 3 * n), vector(arms->swung.at + 3 * n));
+        for (I c = 0; c < count; c++) {
+            Vec force = vector(forces + 3 * (c * points + n)), moment = cross(arm, force);
+            to[c] += force.x, to[columns + c] += force.y, to[2 * columns + c] += force.z;
+            to[3 * columns + c] += moment.x, to[4 * columns + c] += moment.y, to[5 * columns + c] += moment.z;
+            if (lines->angle.at[n] >= 0)
+                out[mesh->angle_home.at[lines->angle.at[n]] * columns + first + c] += dot(by_turn, force);
+        }
+    }
+}
+
+/* Tighten the spans at places and rates of the points, and add what resists the pull of spans
+   between frames to the residual; returns the least length of a span, m. */
+D pull_cables(const Lines *lines, const Mesh *mesh, const Arms *arms, const Ropes *ropes,
+              const I *behind, I pulleys, const Drums *drums, const Laws *laws, const D *places,
+              I n_places, const D *rates, I n_rates, const Spans *spans, D *g, I n_g) {
+    (void)n_g;
+    D least = pull_tight(ropes, behind, pulleys, drums, laws, places, n_places, rates, n_rates, spans);
+    for (I s = 0; s < lines->span.n; s++) {
+        I span = lines->span.at[s];
+        Vec force = times(spans->tension.at[span], vector(spans->unit.at + 3 * span));
+        for (int side = 0; side < 2; side++) {
+            I n = lines->near.at[s] + side, angle = lines->angle.at[n];
+            Vec pull = side ? force : times(-1.0, force);
+            push(g + mesh->home.at[lines->frame.at[n]], pull, cross(vector(arms->whole.at + 3 * n), pull));
+            if (angle >= 0)
+                g[mesh->angle_home.at[angle]] +=
+                    dot(vector(arms->axis.at + 3 * n), cross(vector(arms->swung.at + 3 * n), pull));
+        }
+    }
+    return least;
+}
+
+enum { END = 7, ENDS = 14 };
+
+/* How the points at the ends of a span move with its unknowns, and what arms that turn under its
+   constant pull add to the front. */
+static void turn_arms(const Lines *lines, const Arms *arms, const Spans *spans, I s, D *front,
+                      I columns, D legs[3][ENDS]) {
+    I span = lines->span.at[s];
+    const I *local = lines->local.at + ENDS * s;
+    for (int side = 0; side < 2; side++) {
+        I n = lines->near.at[s] + side;
+        int own = END * side;
+        D sign = 2.0 * side - 1.0;
+        Vec arm = vector(arms->whole.at + 3 * n), swung = vector(arms->swung.at + 3 * n),
+            axis = vector(arms->axis.at + 3 * n), swing = cross(axis, swung);
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 6; j++) legs[i][own + j] = 0.0;
+            legs[i][own + i] = sign;
+        }
+        legs[0][own + 6] = sign * swing.x, legs[1][own + 6] = sign * swing.y, legs[2][own + 6] = sign * swing.z;
+        legs[0][own + 4] = sign * arm.z, legs[0][own + 5] = -sign * arm.y;
+        legs[1][own + 3] = -sign * arm.z, legs[1][own + 5] = sign * arm.x;
+        legs[2][own + 3] = sign * arm.y, legs[2][own + 4] = -sign * arm.x;
+        /* Arms turn under a constant force that resists: as for the ends of elements. */
+        Vec force = times(sign * spans->tension.at[span], vector(spans->unit.at + 3 * span));
+        D along = dot(force, arm), b_along = dot(force, swung), z_along = dot(force, axis);
+        Vec lifted = cross(swing, force);
+        D a[3] = {arm.x, arm.y, arm.z}, f[3] = {force.x, force.y, force.z},
+          lift[3] = {lifted.x, lifted.y, lifted.z}, b[3] = {swung.x, swung.y, swung.z},
+          z[3] = {axis.x, axis.y, axis.z};
+        I k = local[own + 6];
+        for (int i = 0; i < 3; i++) {
+            I row = local[own + 3 + i];
+            for (int j = 0; j < 3; j++) front[row * columns + local[own + 3 + j]] += a[i] * f[j];
+            front[row * columns + row] -= along;
+            if (k >= 0) {
+                front[row * columns + k] += lift[i];
+                front[k * columns + row] += z_along * b[i] - b_along * z[i];
+            }
+        }
+        if (k >= 0) front[k * columns + k] += dot(axis, lifted);
+    }
+}
+
+/* Add how the pulls of spans between frames turn with the spans and the arms to the fronts. */
+static void add_line_tangent(const Lines *lines, const Arms *arms, const Spans *spans,
+                             const Fronts *fronts) {
+    D legs[3][ENDS], pulled[3][ENDS];
+    I columns = fronts->columns;
+    for (I s = 0; s < lines->span.n; s++) {
+        I span = lines->span.at[s];
+        const I *local = lines->local.at + ENDS * s;
+        D *front = front_of(fronts, lines->front.at[s]);
+        turn_arms(lines, arms, spans, s, front, columns, legs);
+        /* T (1 - u u^T) / L: the tension turns with the span. */
+        Vec unit = vector(spans->unit.at + 3 * span);
+        D stiffness = spans->tension.at[span] / spans->length.at[span];
+        for (int j = 0; j < ENDS; j++) {
+            Vec leg = {legs[0][j], legs[1][j], legs[2][j]};
+            Vec aside = times(stiffness, minus(leg, times(dot(unit, leg), unit)));
+            pulled[0][j] = aside.x, pulled[1][j] = aside.y, pulled[2][j] = aside.z;
+        }
+        for (int i = 0; i < ENDS; i++) {
+            if (local[i] < 0) continue;
+            D *row = front + local[i] * columns;
+            for (int j = 0; j < ENDS; j++)
+                if (local[j] >= 0)
+                    row[local[j]] += legs[0][i] * pulled[0][j] + legs[1][i] * pulled[1][j] +
+                                     legs[2][i] * pulled[2][j];
+        }
+    }
+}
+
+/* Changes of tension in factors as pulls on all points, and what they change with after places of
+   all points, (2, count, points, 3), from those of spans. */
+void spread_changes(const Ropes *ropes, const Spans *spans, const D *pulls, I n_pulls,
+                    const D *changes, I n_changes, D *out, I n_out) {
+    (void)n_changes;
+    I n = spans->length.n, count = n ? n_pulls / n : 0, half = n_out / 2, points = count ? half / (3 * count) : 0;
+    for (I row = 0; row < count; row++)
+        for (I i = 0; i < n; i++) {
+            D *pull = out + 3 * (row * points + ropes->near.at[i]), *change = pull + half;
+            Vec own = times(pulls[row * n + i], vector(spans->unit.at + 3 * i));
+            Vec with = vector(changes + 3 * (row * n + i));
+            add_vector(pull, times(-1.0, own));
+            add_vector(pull + 3, own);
+            add_vector(change, times(-1.0, with));
+            add_vector(change + 3, with);
+        }
+}
+
+/* Add how spans turn to the fronts, and how tensions change to the border's columns and rows, shape
+   (unknowns, columns), from the first on; factors are zeros, (2, count, points, 3). */
+void add_cables(const Lines *lines, const Mesh *mesh, const Arms *arms, const Ropes *ropes,
+                const Drums *drums, const Laws *laws, const D *slopes, I n_slopes, const Spans *spans,
+                const D *rates, I n_rates, const D *left, I n_left, D rate_by_place, D *factors,
+                I n_factors, const Fronts *fronts, D *columns, I n_columns, D *rows, I n_rows, I first) {
+    (void)n_rows;
+    I n = spans->length.n, points = lines->frame.n, count = points ? n_factors / (6 * points) : 0;
+    I wide = n_columns / mesh->unknowns;
+    D pulls[count * n + 1], changes[3 * count * n + 1];
+    memset(pulls, 0, sizeof pulls), memset(changes, 0, sizeof changes);
+    tension_changes(ropes, drums, row_of(&laws->decays, DECAY), 0, row_of(&laws->slopes, BY_ANGLE), 0,
+                    slopes, n_slopes, spans, rates, n_rates, left, n_left, 1.0, rate_by_place, pulls,
+                    count * n, changes, 3 * count * n);
+    spread_changes(ropes, spans, pulls, count * n, changes, 3 * count * n, factors, n_factors);
+    add_line_tangent(lines, arms, spans, fronts);
+    pull_lines(lines, mesh, arms, factors, count, columns, wide, first);
+    pull_lines(lines, mesh, arms, factors + n_factors / 2, count, rows, wide, first);
+}

@@ -1,0 +1,106 @@
+"""The border to the core: what it refuses, which library it takes, and how it is compiled."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from ringsim.core import building, library
+from ringsim.core.library import NotBuiltError, call
+from ringsim.frame.laws import play, taped
+
+WIDE = library._has_wide_registers()
+
+
+class Pose(NamedTuple):
+    place: np.ndarray
+    axes: np.ndarray
+    angle: np.ndarray
+
+
+def pose(axes: np.ndarray) -> Pose:
+    return Pose(np.zeros((len(axes), 3)), axes, np.zeros(0))
+
+
+@pytest.mark.quick
+def test_arrays_that_are_not_whole_or_of_other_numbers_are_refused() -> None:
+    axes = np.tile(np.eye(3), (4, 1, 1))
+    with pytest.raises(TypeError, match=r"whole arrays of 64 bits, not float64 \(144"):
+        call("straighten", pose(axes[::2]))
+    with pytest.raises(TypeError, match=r"not float32"):
+        call("straighten", pose(axes.astype(np.float32)))
+
+
+@pytest.mark.quick
+def test_tables_are_forgotten_one_day_and_never_mistaken() -> None:
+    """More tables than are kept: each call sees its own arrays, also where an ``id`` is used again."""
+    for n in range(3 * library._MOST_KNOWN):
+        axes = (1.0 + 1e-9 * n) * np.tile(np.eye(3), (2, 1, 1))
+        call("straighten", pose(axes))
+        np.testing.assert_allclose(axes, np.tile(np.eye(3), (2, 1, 1)), atol=1e-12)
+    assert len(library._known) <= library._MOST_KNOWN
+
+
+@pytest.mark.quick
+def test_a_core_that_is_not_compiled_is_told_with_the_cure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(library, "_FOLDER", tmp_path)
+    with pytest.raises(NotBuiltError, match=r"not compiled here: install it \(pip install \.\)"):
+        library._library.__wrapped__()
+
+
+BITS = """
+import json, sys
+from ringsim.core import library
+library._has_wide_registers = lambda: sys.argv[1] == "wide"
+import ringsim
+scene = ringsim.load_scene("ring18-cable").with_values(
+    {"structure.sections": 3, "solver.end_time": 2.0}
+)
+run = ringsim.simulate(scene, fidelity="frame")
+assert run.status.item() == 0, run.reason
+print(json.dumps([run.opening_angle.values.ravel().tolist(), run.cable_tension.values.ravel().tolist()]))
+"""
+
+
+@pytest.mark.skipif(not WIDE, reason="the processor has no AVX2")
+def test_results_are_the_same_bits_with_and_without_wide_registers() -> None:
+    def found(name: str) -> list[list[float]]:
+        done = subprocess.run(
+            [sys.executable, "-c", BITS, name], capture_output=True, text=True, check=True
+        )
+        return json.loads(done.stdout)
+
+    narrow, wide = found("narrow"), found("wide")
+    assert len(narrow[0]) > 100
+    assert narrow == wide
+
+
+@pytest.mark.quick
+def test_a_compiler_is_asked_for_only_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = building.get_requires_for_build_wheel
+    monkeypatch.setattr(building.build_meta, "get_requires_for_build_wheel", lambda _: ["other"])
+    monkeypatch.setattr(building, "has_compiler", lambda: True)
+    assert asked() == ["other"]
+    monkeypatch.setattr(building, "has_compiler", lambda: False)
+    assert asked() == ["other", building.COMPILER]
+    monkeypatch.setattr(os, "environ", {})
+    building._choose_compiler()
+    assert os.environ["CC"].endswith("-m ziglang cc")
+
+
+@pytest.mark.quick
+def test_a_number_that_is_none_stays_none_in_laws() -> None:
+    """As numpy has it: what is lost in a law must not look like a value."""
+    tape = taped([(lambda x, y: np.maximum(np.minimum(x, y), -1.0), (3,), object())], 2, 1)
+    tape.rows[0], tape.rows[1] = [np.nan, 1.0, -5.0], 2.0
+    play(tape)
+    np.testing.assert_array_equal(tape.rows[2], [np.nan, 1.0, -1.0])
