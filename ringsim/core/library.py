@@ -16,7 +16,7 @@ import numpy as np
 
 _FOLDER = Path(__file__).parent
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
-_FUNCTIONS = {
+_FUNCTIONS: dict[str, tuple[str, Any]] = {
     "numbers_of_a_load": ("", _WHOLE),
     "play": ("t", _NONE),
     "place_points": ("tta", _NONE),

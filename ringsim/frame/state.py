@@ -78,9 +78,10 @@ class Followed(NamedTuple):
 
 class Held(NamedTuple):
     """Where followed coordinates begin, shape (7,): points with mass, points of the cables, joint
-    angles, the ends of the net's strings and its hub, bodies that hang on lines; bodies at the ends of strings, and on lines;
-    bodies with a boom and those that slide along it, lengths (m) at which their turns are held (see
-    ``ringsim.frame.springs.aside``), and the stiffness of both (N/m);
+    angles, the ends of the net's strings and its hub, bodies that hang on lines; bodies at the
+    ends of strings, and on lines; bodies with a boom and those that slide along it, lengths (m) at
+    which their turns are held (see ``ringsim.frame.springs.aside``), and the stiffness of both
+    (N/m);
     linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2.
     """
 
@@ -112,26 +113,11 @@ def balance(
     residual, shape (all unknowns,); returns whether a string pulls.  ``loads`` keep what elements
     hold.
     """
-    return bool(
-        call(
-            "balance",
-            mesh,
-            lines,
-            held,
-            joints,
-            web,
-            coefficients,
-            step,
-            start,
-            pose,
-            hub,
-            arms,
-            now,
-            strains,
-            loads,
-            g,
-        )  # fmt: skip
-    )
+    found = call(
+        "balance", mesh, lines, held, joints, web, coefficients, step, start, pose, hub, arms, now,
+        strains, loads, g,
+    )  # fmt: skip
+    return bool(found)
 
 
 def differentiate(

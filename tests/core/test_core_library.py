@@ -40,7 +40,7 @@ def test_arrays_that_are_not_whole_or_of_other_numbers_are_refused() -> None:
 
 @pytest.mark.quick
 def test_tables_are_forgotten_one_day_and_never_mistaken() -> None:
-    """More tables than are kept: each call sees its own arrays, also where an ``id`` is used again."""
+    """More tables than are kept: each call sees its own arrays, also where an ``id`` comes again."""
     for n in range(3 * library._MOST_KNOWN):
         axes = (1.0 + 1e-9 * n) * np.tile(np.eye(3), (2, 1, 1))
         call("straighten", pose(axes))
@@ -67,7 +67,7 @@ scene = ringsim.load_scene("ring18-cable").with_values(
 )
 run = ringsim.simulate(scene, fidelity="frame")
 assert run.status.item() == 0, run.reason
-print(json.dumps([run.opening_angle.values.ravel().tolist(), run.cable_tension.values.ravel().tolist()]))
+print(json.dumps([run[n].values.ravel().tolist() for n in ("opening_angle", "cable_tension")]))
 """
 
 
