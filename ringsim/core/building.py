@@ -49,7 +49,8 @@ def build_editable(folder: str, settings: Any = None, metadata: str | None = Non
 
 def _choose_compiler() -> None:
     if not has_compiler():
-        compiler = f"{shlex.quote(sys.executable)} -m ziglang cc"
+        # For any processor of this kind, as others compile; Zig's default is this one alone.
+        compiler = f"{shlex.quote(sys.executable)} -m ziglang cc -mcpu=baseline"
         # Zig looks for undefined behaviour unless told not to, at several times the cost.
         plain = "-fno-sanitize=all"
         os.environ |= {"CC": compiler, "LDSHARED": f"{compiler} -shared", "CFLAGS": plain}

@@ -49,7 +49,12 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "add_cables": ("ttttttataarataaw", _NONE),
 }
 """What each takes, tables (t), arrays (a), real (r) and whole numbers (w), and what it returns."""
-_TYPES = {"t": [ctypes.c_void_p], "a": [ctypes.c_void_p, _WHOLE], "r": [_REAL], "w": [_WHOLE]}
+_TYPES: dict[str, list[Any]] = {
+    "t": [ctypes.c_void_p],
+    "a": [ctypes.c_void_p, _WHOLE],
+    "r": [_REAL],
+    "w": [_WHOLE],
+}
 _MOST_KNOWN = 64
 """Packed tables that are kept at most."""
 
@@ -71,8 +76,9 @@ def _function(name: str) -> Any:
 def _library() -> ctypes.PyDLL:
     """That for this processor.  It keeps Python's lock: nothing else runs meanwhile."""
     for name in ("_wide", "_core") if _has_wide_registers() else ("_core",):
-        for file in sorted(_FOLDER.glob(f"{name}.*so")):
-            return ctypes.PyDLL(str(file))
+        # A checkout may hold some, of other versions of Python.
+        if found := list(_FOLDER.glob(f"{name}.*so")):
+            return ctypes.PyDLL(str(max(found, key=lambda file: file.stat().st_mtime)))
     raise NotBuiltError(
         f"{_FOLDER}: the core of ringsim is not compiled here: install it (pip install .), or, to "
         "work on its sources, pip install -e ."

@@ -40,7 +40,7 @@ def test_arrays_that_are_not_whole_or_of_other_numbers_are_refused() -> None:
 
 @pytest.mark.quick
 def test_tables_are_forgotten_one_day_and_never_mistaken() -> None:
-    """More tables than are kept: each call sees its own arrays, also where an ``id`` comes again."""
+    """More tables than are kept: each call sees its own arrays, also where an id comes again."""
     for n in range(3 * library._MOST_KNOWN):
         axes = (1.0 + 1e-9 * n) * np.tile(np.eye(3), (2, 1, 1))
         call("straighten", pose(axes))
@@ -94,7 +94,7 @@ def test_a_compiler_is_asked_for_only_where_there_is_none(monkeypatch: pytest.Mo
     assert asked() == ["other", building.COMPILER]
     monkeypatch.setattr(os, "environ", {})
     building._choose_compiler()
-    assert os.environ["CC"].endswith("-m ziglang cc")
+    assert os.environ["CC"].endswith("-m ziglang cc -mcpu=baseline")
 
 
 @pytest.mark.quick
