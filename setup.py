@@ -5,8 +5,8 @@ from pathlib import Path
 
 from setuptools import Extension, setup
 
-SOURCES = sorted(str(file) for file in Path("ringsim/core").glob("*.c"))
-HEADERS = sorted(str(file) for file in Path("ringsim/core").glob("*.h"))
+SOURCES = sorted(str(file) for file in Path("ringsim/core/c").glob("*.c"))
+HEADERS = sorted(str(file) for file in Path("ringsim/core/c").glob("*.h"))
 # No product and sum in one rounding, and no other order of sums: results are the same bits with any
 # registers.
 FLAGS = [
@@ -23,7 +23,7 @@ WIDE = ["-mavx2"] if platform.machine() in ("x86_64", "AMD64") else []
 def core(name: str, flags: list[str]) -> Extension:
     """A library that ctypes loads: it needs nothing of Python's."""
     return Extension(
-        f"ringsim.core.{name}", SOURCES, depends=HEADERS, extra_compile_args=[*FLAGS, *flags],
+        f"ringsim.core.c.{name}", SOURCES, depends=HEADERS, extra_compile_args=[*FLAGS, *flags],
         libraries=["m"],
     )  # fmt: skip
 

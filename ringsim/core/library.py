@@ -2,7 +2,7 @@
 
 A table is a NamedTuple of arrays, numbers and further tables: the core sees it as a struct of the
 same order, of which an array is its address, its length and how many numbers each of its rows has
-(ringsim/core/core.h).
+(ringsim/core/c/core.h).
 """
 
 import ctypes
@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-_FOLDER = Path(__file__).parent
+_FOLDER = Path(__file__).parent / "c"
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
 _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "numbers_of_a_load": ("", _WHOLE),
