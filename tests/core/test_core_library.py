@@ -16,8 +16,8 @@ from ringsim.core import library
 from ringsim.core.library import NotBuiltError, call
 from ringsim.frame.laws import play, taped
 
-# It stands by itself, beside what it compiles, and needs setuptools, which a run does not.
-sys.path.insert(0, str(Path(library.__file__).parent / "c"))
+# It stands beside pyproject.toml, and needs setuptools, which a run does not.
+sys.path.insert(0, str(Path(__file__).parents[2]))
 import building
 
 WIDE = library._has_wide_registers()

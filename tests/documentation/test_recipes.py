@@ -44,7 +44,7 @@ def test_what_recipes_copy_is_there_and_is_all_that_an_installation_reads() -> N
     }  # fmt: skip
     assert copied == {line.split()[0] for line in section("files").splitlines() if line.strip()}
     assert all((ROOT / name).exists() for name in copied)
-    own = {"pyproject.toml", "setup.py", "ringsim"}
+    own = {"pyproject.toml", "setup.py", "building.py", "ringsim"}
     assert own | {PROJECT["readme"], *PROJECT["license-files"]} == copied
     kept = (ROOT / ".dockerignore").read_text(encoding="utf-8").split()
     assert {name.removeprefix("!") for name in kept if name.startswith("!")} == copied
