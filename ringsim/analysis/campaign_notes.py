@@ -1,5 +1,6 @@
 """What a merged campaign says about its runs and their numerics, in lines for people."""
 
+import re
 import textwrap
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.design import LOST, NOT_RUN, REACHED, UNKNOWN, endings_of, kinds_of_ends
-from ringsim.analysis.intervals import used, worst_sample
+from ringsim.analysis.intervals import good, used, worst_sample
 from ringsim.analysis.worst import losses
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
@@ -23,8 +24,8 @@ _LONGEST = 200
 
 
 def notes(campaign: xr.Dataset) -> list[str]:
-    """What became of the antenna, the largest values, and runs that were repeated."""
-    parts = (outcome_lines, peak_lines, override_lines, restart_lines)
+    """What became of the antenna, the largest values, runs that were repeated, and remarks."""
+    parts = (outcome_lines, peak_lines, override_lines, restart_lines, remark_lines)
     return [line for part in parts for line in part(campaign)]
 
 
@@ -61,6 +62,28 @@ def ending_lines(
         if word != UNKNOWN:
             lines.append(f"{word.removeprefix(LOST)}: {len(own)} of {run}{told}")
     return lines
+
+
+_NUMBER = re.compile(r"\d[\d.]*(?:e[+-]?\d+)?")
+_PLACES = re.compile(r"\b(upper|lower) \d+(?:, (?:(?:upper|lower) )?\d+)*(?: and \d+ more)?")
+
+
+def remark_lines(campaign: xr.Dataset) -> list[str]:
+    """Remarks that runs make on their own numbers behind their reason, alike but for numbers and
+    places: how many samples make each, with the first one's words.
+    """
+    if "reason" not in campaign:
+        return []
+    found: dict[str, list[tuple[int, str]]] = {}
+    held, reasons = good(campaign), campaign["reason"].to_numpy()
+    for sample in np.flatnonzero(held).tolist():
+        for remark in str(reasons[sample]).split("; ")[1:]:
+            kind = _NUMBER.sub("#", _PLACES.sub("#", remark))
+            found.setdefault(kind, []).append((sample, remark))
+    return [
+        f"remark of {len(own)} of {int(held.sum())} samples: {own[0][1]} (sample {own[0][0]})"
+        for own in sorted(found.values(), key=len, reverse=True)
+    ]
 
 
 def override_lines(campaign: xr.Dataset) -> list[str]:

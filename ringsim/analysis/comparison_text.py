@@ -12,6 +12,8 @@ from ringsim.tables import Table, counted, interval_text, number_text, slim, uni
 
 _NAMED = 20
 """Changed outcomes, and values of scenes, that are listed at most."""
+_ALIKE = 1e-3
+"""Difference over the larger mean below which neither is told to be worse, however sure it is."""
 _SHORT = 16
 """Letters of a name up to which it heads columns."""
 
@@ -173,6 +175,9 @@ def _worse(found: xr.Dataset, name: str) -> str:
         ends = np.full(2, found[f"{name}_difference"].item())
     ends = np.sort(quantities()[name].badness * ends)
     first, second = names_of(found)
+    size = np.abs(found[f"{name}_mean"].values).max()
+    if abs(found[f"{name}_difference"].item()) < _ALIKE * size:
+        return "-"
     return second if ends[0] > 0.0 else first if ends[1] < 0.0 else "-"
 
 

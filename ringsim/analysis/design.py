@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
-from ringsim.analysis.intervals import NONE, Interval, good, numbers, standard_error, used
+from ringsim.analysis.intervals import NONE, NOTHING, Interval, good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError, show
@@ -257,7 +257,9 @@ def told(campaign: xr.Dataset, counted: int) -> str:
 
 
 def scalars(campaign: xr.Dataset) -> list[str]:
-    """Main numbers of the antenna that some sample has, in the order of summaries."""
+    """Main numbers of the antenna that some sample has, in the order of summaries; none that is
+    round-off in all samples.
+    """
     sound = used(campaign)
     return [
         name
@@ -267,6 +269,7 @@ def scalars(campaign: xr.Dataset) -> list[str]:
         and name not in (*NUMERICAL, *_EFFORT)
         and name in sound
         and bool(np.isfinite(sound[name]).any())
+        and not bool(np.abs(sound[name]).max() < NOTHING)
     ]
 
 

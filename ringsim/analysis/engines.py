@@ -145,7 +145,9 @@ def verdict(campaign: xr.Dataset, found: list[Difference]) -> list[str]:
     if beyond:
         lines = [f"the engines differ by more than their error bars in {', '.join(beyond)}"]
     elif stated:
-        lines = ["the engines differ by no more than their error bars"]
+        barred = sum(bool(np.isfinite(each.bars).any()) for each in found)
+        of = f" in the {barred} of {len(found)} outputs that have some" * (barred < len(found))
+        lines = [f"the engines differ by no more than their error bars{of}"]
     return lines + too_far(campaign, found)
 
 

@@ -311,12 +311,14 @@ def what_matters(analysis: xr.Dataset) -> Table:
     measure = _measure(analysis)
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
-    rows, quiet, doubtful = [], [], list[str]()
+    rows, quiet, doubtful, more = [], [], list[str](), list[str]()
     separated = _separated_groups(analysis)
     for output, names, others in mattering(analysis):
         if is_moment(output):
             continue
         doubtful += [f"{output} by {name}" for name in others[:_MOST_IN_SHORT]]
+        if len(names) > _MOST_IN_SHORT:
+            more.append(f"{output} {len(names) - _MOST_IN_SHORT}")
         rows += [
             (output if k == 0 else "", *_row_of(analysis, output, name))
             for k, name in enumerate(names[:_MOST_IN_SHORT])
@@ -334,6 +336,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
             f"{10 if twice else 20}; of a mean and its parts only the strongest is listed"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
+    if more:
+        notes.append(f"further inputs beyond chance, told with --full: {', '.join(more)}")
     if doubtful:
         notes.append(
             "not listed, as another input of larger index goes with it and explains it (with that "

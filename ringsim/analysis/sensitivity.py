@@ -15,7 +15,7 @@ from ringsim.analysis import indices
 from ringsim.analysis.design import Blocks, Placement, blocks_of, drawn, population_of
 from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.influence import groups_of
-from ringsim.analysis.intervals import good, lost, numbers, quantities, ran
+from ringsim.analysis.intervals import all_alike, good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import Requirement
 from ringsim.stepping.instant import Array
 from ringsim.variables import about
@@ -52,7 +52,7 @@ def responses(
     for name, variable in quantities().items():
         values = np.where(ok, numbers(campaign, name), np.nan)
         known = values[np.isfinite(values)]
-        if len(known) and np.ptp(known) > 0:
+        if len(known) and not all_alike(known.min(), known.max()):
             found[name] = np.where(np.isfinite(values), values, np.nan), variable.units
     for name, (own, of) in groups_of(campaign, requirements).items():
         own_drawn, of_drawn = own[stand], of[stand]

@@ -13,6 +13,7 @@ from pydantic import Field, ValidationError
 
 from ringsim.analysis import intervals
 from ringsim.analysis.accuracy import in_favour, settings_at
+from ringsim.analysis.campaign_notes import remark_lines
 from ringsim.analysis.design import (
     LOST,
     NUMERICAL,
@@ -120,6 +121,7 @@ def analyse(
             "samples": campaign.sizes["sample"], "samples_run": int(ran(campaign).sum()),
             "design": placed.kind, "intervals": placed.told,
             "stopping": "".join(stopping_lines(campaign, placed)), NOTE: losses(campaign).note,
+            "remarks": "\n".join(remark_lines(campaign)),
         },
     )  # fmt: skip
     found["part"].attrs = about("share of the samples that have run, the first ones")

@@ -448,6 +448,8 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         ]
         of_solution = "error of the solution", "median", "largest", "samples"
         tables.append(marked(Table(of_solution, balances), analysis))
+    if (remarks := analysis.attrs.get("remarks")) and not wanted:
+        tables.append(Table((), (), remarks.split("\n")))
     return tables
 
 

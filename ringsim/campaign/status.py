@@ -85,8 +85,10 @@ def status_lines(campaign: Folder) -> list[str]:
         listed = ", ".join(f"{_named(number)} ({seconds:.0f} s)" for number, seconds in longest)
         lines.append(f"  running        {len(unfinished)}: {listed}")
     if workers and ended.any():
-        rate = workers * ended[0] / max(spent.sum(), 1e-9)
-        lines.append(f"  rate           {rate:.3g} samples/s")
+        if ended[0]:
+            rate = workers * ended[0] / max(spent[0], 1e-9)
+            beside = ", while no check runs" * bool(ended[1])
+            lines.append(f"  rate           {rate:.3g} samples/s{beside}")
         about = _left(campaign, left, spent / np.maximum(ended, 1), workers)
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     return lines

@@ -42,6 +42,11 @@ def opened(path: Path) -> xr.Dataset:
         left, _, _ = merge(open_folder(path), execution="merged on its own", partly=True)
         told = f", {counted(left, 'sample')} not run" if left else ""
         click.echo(f"{path}: merged its results into {MERGED} first{told}")
+    if path.is_dir() and not (path / MERGED).exists() and runs_in(path):
+        raise InputError(
+            f"{path}: this campaign runs just now, and its end merges its results: wait for that, "
+            f"or give ringsim merge {path} to see what there is"
+        )
     return open_stored(path)
 
 

@@ -279,6 +279,11 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     yield from text_table(["angle (deg)", "drive", *of_it, *kinds, *drives], rows)
     for name, drive in drives.items():
         yield f"{name}: margin = {_formula(drive, kinds)}"
+    if "pulley friction" in kinds:
+        yield (
+            "with the pulleys' friction (and a motor's gear) times its factor tensions are found "
+            "anew: margins do not follow from the forces without factors alone"
+        )
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least())}"

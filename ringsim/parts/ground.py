@@ -55,6 +55,11 @@ class Gravity(Model):
             return
         where = f"gravity.vector = {list(self.vector)} m/s^2 on a free base"
         if scene.offload is None:
+            if scene.spacecraft is not None:
+                raise ValueError(
+                    f"{where} with a spacecraft: the structure would fall: leave gravity out; or "
+                    'leave [spacecraft] out and hold it (boom.base = "fixed") or give [offload]'
+                )
             raise ValueError(
                 f"{where}: the structure would fall: hold it "
                 '(boom.base = "fixed"), hang it up ([offload]), or leave gravity out'

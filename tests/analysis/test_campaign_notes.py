@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from made_campaign import made_campaign
 
-from ringsim.analysis.campaign_notes import peak_lines
+from ringsim.analysis.campaign_notes import peak_lines, remark_lines
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import told as all_told
 
 pytestmark = pytest.mark.quick
 
@@ -28,3 +30,24 @@ def test_the_numerical_error_of_a_sample_that_is_named_stands_beside_its_value()
     assert line.endswith("; it states no numerical error, the 2 samples that do have 0.3 N at most")
     assert "nan" not in line
     assert sum("error_bars_every" in line for line in peak_lines(made)) == 1
+
+
+def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
+    """Alike but for numbers and places; failed runs have reasons, and no remarks that count."""
+    made = made_campaign(12, failed=(4,))
+    reached = "all V-joints have reached 180 deg"
+    steps = "steps of {} ms at the lock at {} s pass over shocks in the rods (period 1 ms)"
+    latch = "whether the latch of {} catches is uncertain, as another joint locked in the same step"
+    reasons = [reached] * 12
+    for sample, numbers in {1: (2.5, 9.1), 4: (1.0, 9.2), 7: (1.2e-3, 30.25), 9: (3, 9)}.items():
+        reasons[sample] += "; " + steps.format(*numbers)
+    reasons[9] += "; " + latch.format("upper 3, lower 5 and 2 more")
+    reasons[10] += "; " + latch.format("lower 1")
+    reasons[11] += "; " + latch.format("upper 2, 4")
+    made["reason"] = "sample", np.array(reasons, dtype=object)
+    first, second = remark_lines(made)
+    assert first == f"remark of 3 of 11 samples: {steps.format(2.5, 9.1)} (sample 1)"
+    assert second.startswith("remark of 3 of 11 samples: whether the latch of upper 3, lower 5 and")
+    lines = "\n".join(all_told(analyse(made)))
+    assert " ".join(first.split()) in " ".join(lines.split())
+    assert remark_lines(made_campaign(3)) == []

@@ -173,10 +173,17 @@ def _grid(rows: list[tuple[Array, Array]]) -> Array:
     return np.linspace(low, max((float(angle[-1]) for angle in known), default=180.0), _ANGLES)
 
 
+_SAME_ANGLE = 1e-6
+"""Difference of angles that is none, deg: round-off is 1e-13, a run's step 1e-2."""
+
+
 def _laid(grid: Array, angle: Array, margins: Array) -> Array:
     """NaN where a run has not been."""
     if not len(angle):
         return np.full(len(grid), np.nan)
+    # Runs begin at one angle but for round-off, there where margins often are least.
+    for end in angle[0], angle[-1]:
+        grid = np.where(np.abs(grid - end) < _SAME_ANGLE, end, grid)
     return np.asarray(np.interp(grid, angle, margins, left=np.nan, right=np.nan))
 
 

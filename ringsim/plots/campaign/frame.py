@@ -90,10 +90,8 @@ def shown(campaign: xr.Dataset) -> tuple[list[str], str]:
         and len(values_of(campaign, name)[1])
     ]  # fmt: skip
     known = {name: values_of(campaign, name)[1] for name in names}
-    flat = [
-        name for name, values in known.items()
-        if name not in limited and np.ptp(values) < _APART * np.abs(values).max()
-    ]  # fmt: skip
+    several = [name for name in names if name not in limited and len(known[name]) > 1]
+    flat = [name for name in several if np.ptp(known[name]) < _APART * np.abs(known[name]).max()]
     if not flat or len(flat) == len(names):
         return names, ""
     rest = [name for name in names if name not in flat]
