@@ -123,7 +123,8 @@ class Chain:
         for _ in range(MOST_SOLVED):
             tensions = pulley_tensions(ropes, spans.tension)
             previous = log_decays
-            log_decays = self.friction.decays(Pulleys(spans.angle, np.abs(spans.speed), tensions))
+            seen = Pulleys(spans.angle, np.abs(spans.speed), tensions)
+            log_decays = _whole(self.friction.decays(seen))
             tighten(table, drums, log_decays, spans)
             if not self.friction.loads or np.abs(log_decays - previous).max(initial=0.0) < SOLVED:
                 return self.read(ropes, table, drums, spans, log_decays, wound, wound_rate)
@@ -209,11 +210,12 @@ class Chain:
             state.shares, state.exponents, state.speeds,
         )  # fmt: skip
         drums = Drums(state.natural, state.wound_rates, np.zeros(len(ropes.starts)))
-        count, n = factors_needed(table, slopes), ropes.spans
+        count, n = factors_needed(table, _whole(slopes)), ropes.spans
         pulls, found = np.zeros((count, n)), np.zeros((count, n, 3))
         tension_changes(
-            table, drums, state.log_decays, friction.by_angle(state.pulleys), slopes, spans,
-            velocities, left, by_place, by_rate, pulls, found,
+            table, drums, state.log_decays, _whole(friction.by_angle(state.pulleys)),
+            _whole(slopes), spans, _whole(velocities), _whole(left), by_place, by_rate, pulls,
+            found,
         )  # fmt: skip
         told, row = [], 0
         for rope in np.flatnonzero(ropes.alive).tolist():
@@ -228,6 +230,11 @@ class Chain:
         if self._known is None or self._known[0] is not ropes:
             self._known = ropes, self.table(ropes), Spans.empty(ropes)
         _, table, spans = self._known
-        measure(table, ropes.behind, points, velocities, spans)
+        measure(table, ropes.behind, _whole(points), _whole(velocities), spans)
         ropes.require_length(spans.length)
         return table, spans
+
+
+def _whole(numbers: Array) -> Array:
+    """As the core takes them: laws may give whole numbers, and callers parts of arrays."""
+    return np.ascontiguousarray(numbers, dtype=float)

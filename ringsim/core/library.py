@@ -6,18 +6,23 @@ same order, of which an array is its address, its length and how many numbers ea
 """
 
 import ctypes
+import hashlib
 import platform
 import struct
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 _FOLDER = Path(__file__).parent / "c"
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
 _FUNCTIONS: dict[str, tuple[str, Any]] = {
-    "numbers_of_a_load": ("", _WHOLE),
+    "compiled_from": ("", ctypes.c_char_p),
+    "words_of_table": ("w", _WHOLE),
+    "constant_of_fronts": ("w", _WHOLE),
+    "room_for_loads": ("w", _WHOLE),
     "play": ("t", _NONE),
     "place_points": ("tta", _NONE),
     "move": ("tta", _NONE),
@@ -36,53 +41,71 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "factor": ("tt", _TRUTH),
     "solve": ("tta", _NONE),
     "solve_one": ("tta", _NONE),
-    "measure": ("taaat", _REAL),
+    "measure": ("tnaat", _REAL),
     "slide": ("ttt", _NONE),
     "tighten": ("ttat", _NONE),
     "of_ropes": ("ttta", _NONE),
-    "show": ("attt", _NONE),
-    "pull_tight": ("tattaat", _REAL),
-    "pull_cables": ("ttttattaata", _REAL),
+    "show": ("nttt", _NONE),
+    "pull_tight": ("tnttaat", _REAL),
+    "pull_cables": ("ttttnttaata", _REAL),
     "factors_needed": ("ta", _WHOLE),
     "tension_changes": ("ttaaataarraa", _NONE),
     "spread_changes": ("ttaaa", _NONE),
-    "add_cables": ("ttttttataarataaw", _NONE),
+    "add_cables": ("ttttttataaraaataaw", _NONE),
 }
-"""What each takes, tables (t), arrays (a), real (r) and whole numbers (w), and what it returns."""
+"""What each takes: tables (t), arrays of real (a) and whole numbers (n), such numbers (r, w); and
+what it returns.
+"""
 _TYPES: dict[str, list[Any]] = {
-    "t": [ctypes.c_void_p],
-    "a": [ctypes.c_void_p, _WHOLE],
-    "r": [_REAL],
-    "w": [_WHOLE],
-}
+    "t": [ctypes.c_void_p], "a": [ctypes.c_void_p, _WHOLE], "n": [ctypes.c_void_p, _WHOLE],
+    "r": [_REAL], "w": [_WHOLE],
+}  # fmt: skip
+_KINDS = {NDArray[np.float64]: "a", NDArray[np.int64]: "n", float: "r", int: "w", bool: "w"}
+"""The same of fields of tables, by their annotations."""
 _MOST_KNOWN = 64
 """Packed tables that are kept at most."""
 
 
 class NotBuiltError(RuntimeError):
-    """The core has not been compiled where this package lies."""
+    """The core has not been compiled where this package lies, or of other sources."""
 
 
 @cache
-def _function(name: str) -> Any:
+def _function(name: str) -> tuple[str, Any]:
     takes, returns = _FUNCTIONS[name]
     found = getattr(_library(), name)
     found.argtypes = [each for letter in takes for each in _TYPES[letter]]
     found.restype = returns
-    return found
+    return takes, found
 
 
 @cache
 def _library() -> ctypes.PyDLL:
     """That for this processor.  It keeps Python's lock: nothing else runs meanwhile."""
+    whys = ["is not compiled here"]
     for name in ("_wide", "_core") if _has_wide_registers() else ("_core",):
         # A checkout may hold some, of other versions of Python.
-        if found := list(_FOLDER.glob(f"{name}.*so")):
-            return ctypes.PyDLL(str(max(found, key=lambda file: file.stat().st_mtime)))
+        for file in sorted(_FOLDER.glob(f"{name}.*so"), key=lambda file: -file.stat().st_mtime):
+            try:
+                found = ctypes.PyDLL(str(file))
+            except OSError as error:  # of another machine that shares the folder
+                whys.append(f"cannot be loaded ({error})")
+                continue
+            found.compiled_from.restype = ctypes.c_char_p
+            if found.compiled_from().decode() == _digest():
+                return found
+            whys.append("was compiled of other sources")
     raise NotBuiltError(
-        f"{_FOLDER}: the core of ringsim is not compiled here: install it (pip install .), or, to "
-        "work on its sources, pip install -e ."
+        f"{_FOLDER}: the core of ringsim {whys[-1]}: install it (pip install .), or, to work on "
+        "its sources, pip install -e . after each change of them"
     )
+
+
+def _digest() -> str:
+    """Of the sources, as setup.py takes it."""
+    files = sorted([*_FOLDER.glob("*.c"), *_FOLDER.glob("*.h")])
+    whole = b"".join(file.read_bytes() for file in files)
+    return hashlib.blake2b(whole, digest_size=8).hexdigest()
 
 
 def _has_wide_registers() -> bool:
@@ -90,7 +113,8 @@ def _has_wide_registers() -> bool:
     if platform.machine() not in ("x86_64", "AMD64"):
         return False
     try:
-        return " avx2 " in Path("/proc/cpuinfo").read_text(encoding="ascii", errors="replace")
+        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
+            return any(" avx2 " in line for line in file if line.startswith("flags"))
     except OSError:
         return False
 
@@ -100,23 +124,28 @@ def call(name: str, *given: Any) -> Any:
 
     TypeError for an array that is not whole or of other numbers.
     """
+    takes, function = _function(name)
     words: list[Any] = []
     held = []  # until the function returns, whatever is forgotten meanwhile
-    for each in given:
-        if isinstance(each, np.ndarray):
-            words += _address(each), each.size
-        elif isinstance(each, tuple):
+    for letter, each in zip(takes, given, strict=True):
+        if letter in "an":
+            words += _address(each, letter), each.size
+        elif letter == "t":
             held.append(_packed(each))
             words.append(held[-1].address)
         else:
             words.append(each)
-    return _function(name)(*words)
+    return function(*words)
 
 
-def _address(array: Any) -> int:
-    if not array.flags.c_contiguous or array.dtype.char not in "dl":
+def _address(array: Any, letter: str) -> int:
+    if array.size and not (
+        array.flags.c_contiguous and array.dtype.char == ("d" if letter == "a" else "l")
+    ):
+        wanted = "real" if letter == "a" else "whole"
         raise TypeError(
-            f"the core takes whole arrays of 64 bits, not {array.dtype} {array.strides}"
+            f"the core takes whole arrays of {wanted} numbers of 64 bits, not {array.dtype} "
+            f"{array.shape} with strides {array.strides}"
         )
     return int(array.__array_interface__["data"][0])
 
@@ -142,18 +171,32 @@ def _packed(table: Any) -> _Packed:
         if len(_known) >= _MOST_KNOWN:
             _known.clear()
         words = np.array(_words(table), dtype=np.int64)
-        found = _known[id(table)] = _Packed(table, words, _address(words))
+        found = _known[id(table)] = _Packed(table, words, _address(words, "n"))
     return found
+
+
+@cache
+def _fields(kind: type) -> list[str]:
+    """What the fields of a kind of table are, as of ``_FUNCTIONS``."""
+    return [_KINDS.get(each, "t") for each in get_type_hints(kind).values()]
+
+
+def words_of(kind: type) -> int:
+    """Words of a kind of table."""
+    nested = iter(each for each in get_type_hints(kind).values() if each not in _KINDS)
+    each = {"a": 3, "n": 3, "r": 1, "w": 1}
+    return sum(each.get(letter) or words_of(next(nested)) for letter in _fields(kind))
 
 
 def _words(table: Any) -> list[int]:
     words: list[int] = []
-    for each in table:
-        if isinstance(each, np.ndarray):
-            words += _address(each), len(each), int(np.prod(each.shape[1:], dtype=np.int64))
-        elif isinstance(each, tuple):
+    for letter, each in zip(_fields(table.__class__), table, strict=True):
+        if letter in "an":
+            rest = int(np.prod(each.shape[1:], dtype=np.int64))
+            words += _address(each, letter), len(each), rest
+        elif letter == "t":
             words += _words(each)
-        elif isinstance(each, float):
+        elif letter == "r":
             words += struct.unpack("q", struct.pack("d", each))
         else:
             words.append(int(each))

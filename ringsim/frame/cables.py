@@ -176,7 +176,7 @@ def pull_cables(
 
 def add_cables(
     lines: Lines, mesh: Mesh, arms: Arms, table: RopeTable, drums: Drums, laws: Laws, slopes: Array,
-    spans: Spans, rates: Array, left: Array, rate_by_place: float, factors: Array, fronts: Fronts,
+    spans: Spans, rates: Array, left: Array, rate_by_place: float, count: int, fronts: Fronts,
     border: Border,
 ) -> None:  # fmt: skip
     """Add how spans turn to the fronts, and how tensions change to the border's columns and rows
@@ -185,11 +185,14 @@ def add_cables(
     ``laws`` are those of the pulleys' friction, played last for the spans; ``slopes`` those of its
     exponents after the ropes' speeds (s/m), ``rates`` of the points (m/s), ``left`` the share of a
     change of path that stretches each rope, ``rate_by_place`` the derivative of rates after places
-    (1/s), ``factors`` zeros, shape (2, k, points, 3).
+    (1/s), ``count`` the number of factors.
     """
+    n = len(spans.length)
+    pulls, changes = np.zeros((count, n)), np.zeros((count, n, 3))
+    factors = np.zeros((2, count, len(lines.frame), 3))
     call(
         "add_cables", lines, mesh, arms, table, drums, laws, slopes, spans, rates, left,
-        rate_by_place, factors, fronts, border.columns, border.rows, border.first,
+        rate_by_place, pulls, changes, factors, fronts, border.columns, border.rows, border.first,
     )  # fmt: skip
 
 
@@ -353,7 +356,7 @@ class FrameCables:
         add_cables(
             self.lines, self._mesh, arms, self._table, self._drums, self._laws, self._slopes,
             self._spans, rates, self._left, rate_by_place,
-            np.zeros((2, count, self.points, 3)), fronts, border,
+            count, fronts, border,
         )  # fmt: skip
 
     def _retable(self) -> None:

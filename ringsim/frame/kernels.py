@@ -83,11 +83,7 @@ def place_points(mesh: Mesh, pose: Pose, out: Array) -> None:
 
 def room_for_loads(mesh: Mesh) -> Array:
     """Room for what elements hold, from ``add_forces`` to ``begin_tangent``."""
-    return np.zeros(-(-len(mesh.length) // _LANES) * call("numbers_of_a_load"))
-
-
-_LANES = 4
-"""Elements that the core takes at a time."""
+    return np.zeros(call("room_for_loads", len(mesh.length)))
 
 
 def add_forces(

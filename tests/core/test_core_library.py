@@ -7,26 +7,29 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from ringsim.core import library
 from ringsim.core.library import NotBuiltError, call
-from ringsim.frame.laws import play, taped
+from ringsim.core.tension import Drums, RopeTable, Spans
+from ringsim.frame import elimination
+from ringsim.frame.cables import Arms, Laws, Lines
+from ringsim.frame.elimination import Fronts
+from ringsim.frame.kernels import Pose, Strains
+from ringsim.frame.laws import Acting, Tape, play, taped
+from ringsim.frame.mesh import Mesh
+from ringsim.frame.model import FrameModel
+from ringsim.frame.springs import Web
+from ringsim.frame.state import Coefficients, Followed, Held
+from ringsim.scene import load_scene
 
 # It stands beside pyproject.toml, and needs setuptools, which a run does not.
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import building
 
 WIDE = library._has_wide_registers()
-
-
-class Pose(NamedTuple):
-    place: np.ndarray
-    axes: np.ndarray
-    angle: np.ndarray
 
 
 def pose(axes: np.ndarray) -> Pose:
@@ -36,10 +39,43 @@ def pose(axes: np.ndarray) -> Pose:
 @pytest.mark.quick
 def test_arrays_that_are_not_whole_or_of_other_numbers_are_refused() -> None:
     axes = np.tile(np.eye(3), (4, 1, 1))
-    with pytest.raises(TypeError, match=r"whole arrays of 64 bits, not float64 \(144"):
+    with pytest.raises(TypeError, match=r"arrays of real numbers of 64 bits, not float64 .* \(144"):
         call("straighten", pose(axes[::2]))
-    with pytest.raises(TypeError, match=r"not float32"):
-        call("straighten", pose(axes.astype(np.float32)))
+    for other in np.float32, np.int64:
+        with pytest.raises(TypeError, match=f"real numbers of 64 bits, not {other.__name__}"):
+            call("straighten", pose(axes.astype(other)))
+    with pytest.raises(ValueError, match="shorter"):
+        call("straighten")
+
+
+@pytest.mark.quick
+def test_tables_are_as_large_here_as_in_c_and_so_are_constants() -> None:
+    tables = (
+        Mesh, Pose, Strains, Fronts, Tape, Acting, Web, Coefficients, Followed, Held, Lines, Arms,
+        Laws, RopeTable, Drums, Spans,
+    )  # fmt: skip
+    sizes = {kind.__name__: library.words_of(kind) for kind in tables}
+    assert sizes == {k.__name__: call("words_of_table", n) for n, k in enumerate(tables)}
+    here = elimination._PANEL, elimination._WIDE, elimination.EIGHT
+    assert here == tuple(call("constant_of_fronts", n) for n in range(3))
+
+
+@pytest.mark.quick
+def test_a_library_of_other_sources_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a change of them a checkout must be compiled again: tables may have other fields."""
+    monkeypatch.setattr(library, "_digest", lambda: "0123")
+    with pytest.raises(NotBuiltError, match="was compiled of other sources: install it"):
+        library._library.__wrapped__()
+
+
+def test_a_very_long_ring_has_a_tangent() -> None:
+    """144 sections with ropes: what is proportional to the square does not stand on the stack."""
+    scene = load_scene("ring18-cable").with_values({"structure.sections": 144})
+    model = FrameModel(scene)
+    after = model.start.copy()
+    strains = Strains(after.strains, np.zeros_like(after.strains), 1e3)
+    model.residual(1e-3, 1e-3, model.start, after, strains)
+    assert model.tangent(1e-3, 1e-3, after, strains).sound
 
 
 @pytest.mark.quick

@@ -228,3 +228,6 @@ void solve_one(const Mesh *mesh, const Fronts *fronts, D *x, I n_x) {
         for (I i = 0; i < gone; i++) x[spots[begin + i]] = product(inverse + PANEL * i, known, gone);
     }
 }
+
+/* What ringsim.frame.elimination counts with, too. */
+I constant_of_fronts(I number) { return (const I[]){PANEL, WIDE, EIGHT}[number]; }

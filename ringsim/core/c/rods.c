@@ -15,8 +15,10 @@ typedef struct {
     Vec4 d, psi, n, w, m, own, force[2], moment[2], arm[2];
 } Load;
 
-/* Numbers that a group of elements keeps. */
-I numbers_of_a_load(void) { return (I)(sizeof(Load) / sizeof(D)); }
+/* Numbers that so many elements keep. */
+I room_for_loads(I elements) {
+    return (elements + LANES - 1) / LANES * (I)(sizeof(Load) / sizeof(D));
+}
 
 static Vec4 coefficients(Vec4 psi) {
     V square = dot4(psi, psi);

@@ -454,20 +454,20 @@ void spread_changes(const Ropes *ropes, const Spans *spans, const D *pulls, I n_
 }
 
 /* Add how spans turn to the fronts, and how tensions change to the border's columns and rows, shape
-   (unknowns, columns), from the first on; factors are zeros, (2, count, points, 3). */
+   (unknowns, columns), from the first on.  Zeros before: pulls, shape (count, spans), changes,
+   (count, spans, 3), and factors, (2, count, points, 3); a long ring's are too large for a stack. */
 void add_cables(const Lines *lines, const Mesh *mesh, const Arms *arms, const Ropes *ropes,
                 const Drums *drums, const Laws *laws, const D *slopes, I n_slopes, const Spans *spans,
-                const D *rates, I n_rates, const D *left, I n_left, D rate_by_place, D *factors,
-                I n_factors, const Fronts *fronts, D *columns, I n_columns, D *rows, I n_rows, I first) {
+                const D *rates, I n_rates, const D *left, I n_left, D rate_by_place, D *pulls,
+                I n_pulls, D *changes, I n_changes, D *factors, I n_factors, const Fronts *fronts,
+                D *columns, I n_columns, D *rows, I n_rows, I first) {
     (void)n_rows;
-    I n = spans->length.n, points = lines->frame.n, count = points ? n_factors / (6 * points) : 0;
+    I points = lines->frame.n, count = points ? n_factors / (6 * points) : 0;
     I wide = n_columns / mesh->unknowns;
-    D pulls[count * n + 1], changes[3 * count * n + 1];
-    memset(pulls, 0, sizeof pulls), memset(changes, 0, sizeof changes);
     tension_changes(ropes, drums, row_of(&laws->decays, DECAY), 0, row_of(&laws->slopes, BY_ANGLE), 0,
                     slopes, n_slopes, spans, rates, n_rates, left, n_left, 1.0, rate_by_place, pulls,
-                    count * n, changes, 3 * count * n);
-    spread_changes(ropes, spans, pulls, count * n, changes, 3 * count * n, factors, n_factors);
+                    n_pulls, changes, n_changes);
+    spread_changes(ropes, spans, pulls, n_pulls, changes, n_changes, factors, n_factors);
     add_line_tangent(lines, arms, spans, fronts);
     pull_lines(lines, mesh, arms, factors, count, columns, wide, first);
     pull_lines(lines, mesh, arms, factors + n_factors / 2, count, rows, wide, first);

@@ -1,4 +1,4 @@
-/* Rotations: their matrices and vectors, of numbers and of lanes. */
+/* Rotations, of numbers and of lanes; and what the library says of itself. */
 
 #include "core.h"
 
@@ -71,4 +71,19 @@ Vec4 rotation_vector4(const Mat4 *m) {
     if (any((square >= SERIES * SERIES) | (cosine <= 0.0)))
         for (int n = 0; n < LANES; n++) factor[n] = arc_over_sine(square[n], cosine[n]);
     return times4(factor, a);
+}
+
+/* Of which sources this was compiled, and the size of each table in words of eight bytes. */
+
+_Static_assert(sizeof(void *) == 8 && sizeof(I) == 8 && sizeof(D) == 8, "words of eight bytes");
+
+const char *compiled_from(void) { return SOURCES; }
+
+#define WORDS(table) (I)(sizeof(table) / sizeof(I))
+
+I words_of_table(I number) {
+    const I words[] = {WORDS(Mesh), WORDS(Pose), WORDS(Strains), WORDS(Fronts), WORDS(Tape),
+                       WORDS(Acting), WORDS(Web), WORDS(Coefficients), WORDS(Followed), WORDS(Held),
+                       WORDS(Lines), WORDS(Arms), WORDS(Laws), WORDS(Ropes), WORDS(Drums), WORDS(Spans)};
+    return words[number];
 }

@@ -65,7 +65,7 @@ static inline MAT OF(scale)(REAL s, MAT a) {
 
 /* [a], with [a] b = a x b. */
 static inline MAT OF(skew)(VEC a) {
-    REAL none = a.x - a.x;
+    REAL none = {0};
     return (MAT){{none, -a.z, a.y, a.z, none, -a.x, -a.y, a.x, none}};
 }
 
