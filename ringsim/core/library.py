@@ -9,7 +9,9 @@ import ctypes
 import hashlib
 import platform
 import struct
+from contextlib import suppress
 from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
@@ -84,8 +86,7 @@ def _library() -> ctypes.PyDLL:
     """That for this processor.  It keeps Python's lock: nothing else runs meanwhile."""
     whys = ["is not compiled here"]
     for name in ("_wide", "_core") if _has_wide_registers() else ("_core",):
-        # A checkout may hold some, of other versions of Python.
-        for file in sorted(_FOLDER.glob(f"{name}.*so"), key=lambda file: -file.stat().st_mtime):
+        for file in _files(name):
             try:
                 found = ctypes.PyDLL(str(file))
             except OSError as error:  # of another machine that shares the folder
@@ -99,6 +100,20 @@ def _library() -> ctypes.PyDLL:
         f"{_FOLDER}: the core of ringsim {whys[-1]}: install it (pip install .), or, to work on "
         "its sources, pip install -e . after each change of them"
     )
+
+
+def _files(name: str) -> list[Path]:
+    """The libraries of a name, the youngest first; a checkout may hold some for other versions of
+    Python, and one that is not compiled takes what is installed of the same sources: Python finds
+    the package of the folder that it is started in before the one that is installed.
+    """
+    folders = [_FOLDER]
+    with suppress(PackageNotFoundError):
+        folders.append(Path(str(distribution("ringsim").locate_file("ringsim/core/c"))))
+    return [
+        file for folder in folders
+        for file in sorted(folder.glob(f"{name}.*so"), key=lambda file: -file.stat().st_mtime)
+    ]  # fmt: skip
 
 
 def _digest() -> str:

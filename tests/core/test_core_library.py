@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+from importlib.metadata import Distribution
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +63,25 @@ def test_tables_are_as_large_here_as_in_c_and_so_are_constants() -> None:
 
 
 @pytest.mark.quick
+def test_a_checkout_that_is_not_compiled_takes_the_installed_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where a campaign is started in a checkout, and ringsim is installed from it."""
+    installed = tmp_path / "site-packages"
+    (installed / "ringsim" / "core").mkdir(parents=True)
+    (installed / "ringsim" / "core" / "c").symlink_to(library._FOLDER)
+    checkout = tmp_path / "checkout"
+    shutil.copytree(library._FOLDER, checkout, ignore=shutil.ignore_patterns("*.so"))
+    made = type("Made", (), {"locate_file": lambda _, path: installed / path})
+    monkeypatch.setattr(library, "_FOLDER", checkout)
+    monkeypatch.setattr(library, "distribution", lambda _: made())
+    assert library._library.__wrapped__().compiled_from().decode() == library._digest()
+    (checkout / "laws.c").write_text("other sources")
+    with pytest.raises(NotBuiltError, match="of other sources"):
+        library._library.__wrapped__()
+
+
+@pytest.mark.quick
 def test_a_library_of_other_sources_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a change of them a checkout must be compiled again: tables may have other fields."""
     monkeypatch.setattr(library, "_digest", lambda: "0123")
@@ -93,6 +114,7 @@ def test_a_core_that_is_not_compiled_is_told_with_the_cure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(library, "_FOLDER", tmp_path)
+    monkeypatch.setattr(library, "distribution", lambda _: Distribution.at(tmp_path))
     with pytest.raises(NotBuiltError, match=r"not compiled here: install it \(pip install \.\)"):
         library._library.__wrapped__()
 
