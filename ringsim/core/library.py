@@ -9,9 +9,8 @@ import ctypes
 import hashlib
 import platform
 import struct
-from contextlib import suppress
 from functools import cache
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
@@ -107,9 +106,9 @@ def _files(name: str) -> list[Path]:
     Python, and one that is not compiled takes what is installed of the same sources: Python finds
     the package of the folder that it is started in before the one that is installed.
     """
-    folders = [_FOLDER]
-    with suppress(PackageNotFoundError):
-        folders.append(Path(str(distribution("ringsim").locate_file("ringsim/core/c"))))
+    # Of several: building leaves one in the checkout that says nothing of the installed one.
+    installed = [each.locate_file("ringsim/core/c") for each in distributions(name="ringsim")]
+    folders = dict.fromkeys([_FOLDER, *(Path(str(each)) for each in installed)])
     return [
         file for folder in folders
         for file in sorted(folder.glob(f"{name}.*so"), key=lambda file: -file.stat().st_mtime)

@@ -72,9 +72,9 @@ def test_a_checkout_that_is_not_compiled_takes_the_installed_library(
     (installed / "ringsim" / "core" / "c").symlink_to(library._FOLDER)
     checkout = tmp_path / "checkout"
     shutil.copytree(library._FOLDER, checkout, ignore=shutil.ignore_patterns("*.so"))
-    made = type("Made", (), {"locate_file": lambda _, path: installed / path})
+    made = [Distribution.at(place / "ringsim.dist-info") for place in (checkout, installed)]
     monkeypatch.setattr(library, "_FOLDER", checkout)
-    monkeypatch.setattr(library, "distribution", lambda _: made())
+    monkeypatch.setattr(library, "distributions", lambda name: made)
     assert library._library.__wrapped__().compiled_from().decode() == library._digest()
     (checkout / "laws.c").write_text("other sources")
     with pytest.raises(NotBuiltError, match="of other sources"):
@@ -114,7 +114,7 @@ def test_a_core_that_is_not_compiled_is_told_with_the_cure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(library, "_FOLDER", tmp_path)
-    monkeypatch.setattr(library, "distribution", lambda _: Distribution.at(tmp_path))
+    monkeypatch.setattr(library, "distributions", lambda name: [])
     with pytest.raises(NotBuiltError, match=r"not compiled here: install it \(pip install \.\)"):
         library._library.__wrapped__()
 
