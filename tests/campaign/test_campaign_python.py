@@ -142,7 +142,9 @@ def test_verbs_merge_what_was_interrupted_but_not_what_runs(
         assert held
         done = CliRunner().invoke(cli, ["analyse", str(folder)])
         assert done.exit_code == EXIT_BAD_INPUT
-        assert "not merged yet: give ringsim merge runs/small first" in done.output
+        assert (
+            "runs just now, and its end merges its results: wait for that, or give" in done.output
+        )
         assert not (folder / "campaign.nc").exists()
     line = f"{folder}: merged its results into campaign.nc first, 2 samples not run"
     for verb in ("analyse", "export", "report", "plot", "compare"):
