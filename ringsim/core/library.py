@@ -12,13 +12,16 @@ import struct
 from functools import cache
 from importlib.metadata import distributions
 from pathlib import Path
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple, TypeVar, cast, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 _FOLDER = Path(__file__).parent / "c"
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
+ASKED = ctypes.CFUNCTYPE(_WHOLE, _WHOLE)
+"""What the core may ask Python: a function of a whole number that returns 0, or 1 to stop it."""
+NOT_ASKED = ASKED()
 _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "compiled_from": ("", ctypes.c_char_p),
     "words_of_table": ("w", _WHOLE),
@@ -33,8 +36,15 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "add_forces": ("ttaataa", _NONE),
     "begin_tangent": ("ttaaarrt", _NONE),
     "put_in_place": ("ttttata", _NONE),
-    "balance": ("ttttttrttatttaa", _TRUTH),
-    "differentiate": ("ttttttarrrwtaaa", _NONE),
+    "unbalance": ("ttwfrttt", _WHOLE),
+    "stiffen": ("ttwfrtt", _WHOLE),
+    "relax": ("tta", _NONE),
+    "most_iterations": ("", _WHOLE),
+    "learn": ("aaawa", _NONE),
+    "balance_step": ("ttwfrtttra", _WHOLE),
+    "note_rates": ("ta", _NONE),
+    "rates_across": ("ta", _NONE),
+    "slopes_between": ("taaaaa", _NONE),
     "passing_joints": ("taaa", _REAL),
     "stretched": ("taaaaaaa", _NONE),
     "passing_pairs": ("taaa", _REAL),
@@ -46,20 +56,19 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "slide": ("ttt", _NONE),
     "tighten": ("ttat", _NONE),
     "of_ropes": ("ttta", _NONE),
-    "show": ("nttt", _NONE),
     "pull_tight": ("tnttaat", _REAL),
-    "pull_cables": ("ttttnttaata", _REAL),
     "factors_needed": ("ta", _WHOLE),
     "tension_changes": ("ttaaataarraa", _NONE),
     "spread_changes": ("ttaaa", _NONE),
-    "add_cables": ("ttttttataaraaataaw", _NONE),
+    "find_slopes": ("tt", _WHOLE),
+    "limit_of_ropes": ("w", _REAL),
 }
-"""What each takes: tables (t), arrays of real (a) and whole numbers (n), such numbers (r, w); and
-what it returns.
+"""What each takes: tables (t), arrays of real (a) and whole numbers (n), such numbers (r, w) and
+functions (f); and what it returns.
 """
 _TYPES: dict[str, list[Any]] = {
     "t": [ctypes.c_void_p], "a": [ctypes.c_void_p, _WHOLE], "n": [ctypes.c_void_p, _WHOLE],
-    "r": [_REAL], "w": [_WHOLE],
+    "r": [_REAL], "w": [_WHOLE], "f": [ASKED],
 }  # fmt: skip
 _KINDS = {NDArray[np.float64]: "a", NDArray[np.int64]: "n", float: "r", int: "w", bool: "w"}
 """The same of fields of tables, by their annotations."""
@@ -200,6 +209,17 @@ def words_of(kind: type) -> int:
     nested = iter(each for each in get_type_hints(kind).values() if each not in _KINDS)
     each = {"a": 3, "n": 3, "r": 1, "w": 1}
     return sum(each.get(letter) or words_of(next(nested)) for letter in _fields(kind))
+
+
+Table = TypeVar("Table", bound=tuple[Any, ...])
+
+
+def empty_of(kind: type[Table]) -> Table:
+    """A table whose arrays have no rows, and whose numbers are zero: of what a scene has not."""
+    kinds = {"a": np.zeros(0), "n": np.zeros(0, np.int64), "r": 0.0, "w": 0}
+    each = get_type_hints(kind).values()
+    found = (kinds[_KINDS[k]] if k in _KINDS else empty_of(k) for k in each)
+    return cast(Table, cast(Any, kind)(*found))
 
 
 def _words(table: Any) -> list[int]:

@@ -165,16 +165,9 @@ def of_ropes(table: RopeTable, drums: Drums, spans: Spans) -> Array:
 
 PASSING = 2e-4
 """Slope of a pulley's friction over that at rest below which Newton's tangent does without it: more
-than 0.9999 of the friction acts, and the rope's speed no longer changes it."""
-
-
-def felt_slopes(slopes: Array, own: Array, slip_speed: Array) -> Array:
-    """Slopes of the pulleys' friction, s/m, less those that tangents do without: of pulleys that
-    slip, and that Newton has seen on one side alone (``ringsim.stepping.locks``): then slopes are
-    their ``own``.  In a step of 0.1 us a light hinge assembly may turn to and fro at 300 m/s, and
-    only a slope of a hundred-thousandth of that at rest leads it to its place.
-    """
-    return np.where((slopes * slip_speed > PASSING) | (slopes > own), slopes, 0.0)
+than 0.9999 of the friction acts, and the rope's speed no longer changes it.  It keeps what it has
+seen on both sides: in a step of 0.1 us a light hinge assembly may turn to and fro at 300 m/s, and
+only a slope of a hundred-thousandth of that at rest leads it to its place."""
 
 
 def with_law_slopes(

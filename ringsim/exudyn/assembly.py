@@ -11,11 +11,11 @@ from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ringsim.core.turning import Turning
 from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Pose
 from ringsim.parts.joints import JointFriction
 from ringsim.stepping.instant import Passing, lost_between
-from ringsim.stepping.locks import Turning
 
 # Rotations of many bodies at once: unit quaternions (w, v), shape (n, 4), and vectors, (n, 3).
 #

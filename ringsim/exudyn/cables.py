@@ -12,9 +12,9 @@ from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import Winches
 from ringsim.core.chain import Chain
 from ringsim.core.tension import PASSING
+from ringsim.core.turning import Turning
 from ringsim.exudyn.assembly import Array, Assembly, Indices
 from ringsim.exudyn.cable_path import CablePath, Placed
-from ringsim.stepping.locks import Turning
 
 # The Jacobian of the cables' forces after the coordinates of the nodes that carry them.
 #

@@ -25,15 +25,12 @@ from ringsim.core.tension import (
     RopeTable,
     Spans,
     factors_needed,
-    felt_slopes,
-    measure,
-    with_law_slopes,
 )
-from ringsim.frame.elimination import Border, Fronts
-from ringsim.frame.laws import Tape, play, taped
+from ringsim.core.turning import Seen
+from ringsim.frame.elimination import Border
+from ringsim.frame.laws import Tape, taped
 from ringsim.frame.mesh import Indices, Mesh, Parts, Skeleton
 from ringsim.layout.bodies import Array
-from ringsim.stepping.locks import Turning
 
 # Points of the cables' paths on frames (ropes.c).
 #
@@ -99,15 +96,6 @@ def lines_of(
     )  # fmt: skip
 
 
-def no_lines() -> Lines:
-    """Of a scene without cables."""
-    three, whole, one = np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0)
-    return Lines(
-        whole, three, np.zeros((0, 3, 3)), three, whole, one, whole, whole, whole,
-        np.zeros((0, 14), dtype=np.int64),
-    )  # fmt: skip
-
-
 def _point(skeleton: Skeleton, sheave: Sheave) -> tuple[int, Array, Array, Array, int, float]:
     none = np.zeros(3)
     if isinstance(sheave, BlockSheave):
@@ -139,61 +127,41 @@ class Laws(NamedTuple):
     solved: float = SOLVED
 
 
-_DECAY, _BY_SPEED = 3, 4
-"""Rows of the results of ``decays`` and of ``slopes``, behind what laws see."""
+_DECAY = 3
+"""Row of the result of ``decays``, behind what laws see."""
 
 
-def pull_tight(
-    table: RopeTable, behind: Indices, drums: Drums, laws: Laws, places: Array, rates: Array,
-    spans: Spans,
-) -> float:  # fmt: skip
-    """Spans, with their tensions, at places and rates of the points; returns the least length, NaN
-    if no tensions go with the friction (``ringsim.core.tension``).
+class Roped(NamedTuple):
+    """Ropes as faults leave them, with what their winches do and how they run: first spans behind
+    the pulleys, slopes of the pulleys' friction (s/m), the share of a change of path that stretches
+    each rope, room for changes of tension in factors, and the border of the fronts that they make.
     """
-    return float(call("pull_tight", table, behind, drums, laws, places, rates, spans))
 
+    ropes: RopeTable
+    behind: Indices
+    drums: Drums
+    spans: Spans
+    seen: Seen
+    slopes: Array
+    left: Array
+    pulls: Array
+    changes: Array
+    factors: Array
+    border: Border
 
-def spread_changes(
-    table: RopeTable, spans: Spans, pulls: Array, changes: Array, out: Array
-) -> None:
-    """Changes of tension in factors as pulls on all points, and what they change with after places
-    of all points, (2, k, points, 3), from those of spans; see ``tension_changes``.
-    """
-    call("spread_changes", table, spans, pulls, changes, out)
-
-
-def pull_cables(
-    lines: Lines, mesh: Mesh, arms: Arms, table: RopeTable, behind: Indices, drums: Drums,
-    laws: Laws, places: Array, rates: Array, spans: Spans, g: Array,
-) -> float:  # fmt: skip
-    """Tighten the spans at places and rates of the points, and add what resists their pull to the
-    residual, shape (unknowns,); returns the least length of a span, m.
-    """
-    return float(
-        call("pull_cables", lines, mesh, arms, table, behind, drums, laws, places, rates, spans, g)
-    )
-
-
-def add_cables(
-    lines: Lines, mesh: Mesh, arms: Arms, table: RopeTable, drums: Drums, laws: Laws, slopes: Array,
-    spans: Spans, rates: Array, left: Array, rate_by_place: float, count: int, fronts: Fronts,
-    border: Border,
-) -> None:  # fmt: skip
-    """Add how spans turn to the fronts, and how tensions change to the border's columns and rows
-    behind those of a hub.
-
-    ``laws`` are those of the pulleys' friction, played last for the spans; ``slopes`` those of its
-    exponents after the ropes' speeds (s/m), ``rates`` of the points (m/s), ``left`` the share of a
-    change of path that stretches each rope, ``rate_by_place`` the derivative of rates after places
-    (1/s), ``count`` the number of factors.
-    """
-    n = len(spans.length)
-    pulls, changes = np.zeros((count, n)), np.zeros((count, n, 3))
-    factors = np.zeros((2, count, len(lines.frame), 3))
-    call(
-        "add_cables", lines, mesh, arms, table, drums, laws, slopes, spans, rates, left,
-        rate_by_place, pulls, changes, factors, fronts, border.columns, border.rows, border.first,
-    )  # fmt: skip
+    @classmethod
+    def of(
+        cls, ropes: Ropes, table: RopeTable, points: int, unknowns: int, *, hub: bool
+    ) -> "Roped":
+        """Not yet measured, on so many unknowns."""
+        pulleys, spans, count = len(ropes.behind), ropes.spans, len(table.starts)
+        most = factors_needed(table, np.ones(pulleys))
+        return cls(
+            table, ropes.behind, Drums(*np.zeros((3, count))), Spans.empty(ropes),
+            Seen.empty(pulleys), np.zeros(pulleys), np.ones(count), np.zeros((most, spans)),
+            np.zeros((most, spans, 3)), np.zeros((2, most, points, 3)),
+            Border.empty(unknowns, most, hub),
+        )  # fmt: skip
 
 
 # The cables on frames: the chain of ringsim.core, its pulls on the unknowns and its tangent.
@@ -220,26 +188,26 @@ class FrameCables:
         As of ``ringsim.exudyn.cables.CableDrive``.
     lines, points
         What the paths run over; number of their points.
+    laws, roped
+        As tables.
     """
 
     def __init__(self, cables: Cables, skeleton: Skeleton, mesh: Mesh, parts: Parts) -> None:
         self.present = cables.present()
         own, paths = [cable for _, cable in self.present], skeleton.layout.paths
         self._chain = Chain(own, [len(path) for path in paths])
-        self.winches, self._mesh = Winches(own), mesh
+        self.winches = Winches(own)
+        self._unknowns, self._hub = mesh.unknowns, skeleton.layout.hub is not None
         self.points = sum(len(path) for path in paths)
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
         self.ropes = self._chain.start(start)
         self.lines = lines_of(skeleton, parts, paths, self.ropes)
         self._turned_at, self._turned = math.nan, _Turned(*np.zeros((2, len(own), 2)))
-        self._drums = Drums(*np.zeros((3, 0)))
-        self._turning = Turning()
         friction = self._chain.friction
-        self._laws = Laws(
+        self.laws = Laws(
             self._taped(1, "decay"), self._taped(2, "by_angle", "by_speed"), friction.moves,
             friction.loads,
         )  # fmt: skip
-        self._left, self._slopes = np.ones(0), np.ones(0)
         self._retable()
 
     def _taped(self, results: int, *names: str) -> Tape:
@@ -252,16 +220,25 @@ class FrameCables:
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
         """The chain at places and rates of all points; ValueError if it has no answer."""
-        self._turn(time, places, rates)
+        self.turn(time)
+        if self.winches.answering:
+            call("measure", self.roped.ropes, self.roped.behind, places, rates, self.roped.spans)
+            self.answer(time)
         return self._tightened(places, rates)
 
     def _tightened(self, places: Array, rates: Array) -> ChainState:
         """The chain with its winches as they have turned."""
-        ropes, spans, turned = self.ropes, self._spans, self._turned
-        least = pull_tight(self._table, ropes.behind, self._drums, self._laws, places, rates, spans)
-        self._require(least, places, rates)
-        log_decays = self._laws.decays.rows[_DECAY].copy()
-        return self._chain.read(ropes, self._table, self._drums, spans, log_decays, *turned)
+        roped = self.roped
+        least = call(
+            "pull_tight", roped.ropes, roped.behind, roped.drums, self.laws, places, rates,
+            roped.spans,
+        )  # fmt: skip
+        if not (least > SHORTEST and roped.drums.natural.min() > 0.0):  # NaN without an answer
+            self.refuse(places, rates)
+        log_decays = self.laws.decays.rows[_DECAY].copy()
+        return self._chain.read(
+            self.ropes, roped.ropes, roped.drums, roped.spans, log_decays, *self._turned
+        )
 
     def go_on(
         self, ropes: Ropes, places: Array, rates: Array, wound: Array, speed: Array
@@ -284,84 +261,45 @@ class FrameCables:
         """Begin a step at a time (s) in a state of the chain; ``slopes`` are the derivatives of the
         cables' ideal paths after the opening angle, m/rad.
         """
-        self._turning.forget()
+        self.roped.seen.forget()
         self._turned_at = math.nan
         self.winches.advance(time, state, slopes)
 
-    def pull(self, time: float, arms: Arms, places: Array, rates: Array, g: Array) -> None:
-        """Add what resists the cables' pull to the residual, shape (unknowns,); ValueError if the
-        chain has no answer.
+    def refuse(self, places: Array, rates: Array) -> None:
+        """ValueError, with what is wrong, where the chain has no answer."""
+        self._chain.state(self.ropes, places, rates, *self._turned)
+
+    def turn(self, time: float) -> None:
+        """Let winches turn up to a time (s) that do not answer to their ropes: alike in all
+        iterations of a step.
         """
-        self._turn(time, places, rates)
-        least = pull_cables(
-            self.lines, self._mesh, arms, self._table, self.ropes.behind, self._drums,
-            self._laws, places, rates, self._spans, g,
-        )  # fmt: skip
-        self._require(least, places, rates)
-        self._turning.note(self.ropes, self._spans.speed)
+        if time != self._turned_at and not self.winches.answering:
+            self._wind(*self.winches.at(time, self.ropes, None, None))
+            self._turned_at = time
 
-    def _require(self, least: float, places: Array, rates: Array) -> None:
-        """ValueError if a span is shorter than can be, or more rope is wound than there is."""
-        if not (least > SHORTEST and self._enough):  # NaN without an answer
-            self._chain.state(self.ropes, places, rates, *self._turned)  # says what is wrong
+    def answer(self, time: float) -> None:
+        """Let winches turn that answer to their ropes, whose spans are measured."""
+        self._wind(*self.winches.at(time, self.ropes, *self._paths()))
 
-    def _turn(self, time: float, places: Array, rates: Array) -> None:
-        """What the winches have done by a time (s)."""
-        ropes, spans, path, path_rate = self.ropes, self._spans, None, None
-        # Winches that do not answer to their ropes turn alike in all iterations of a step.
-        if time == self._turned_at and not self.winches.answering:
-            return
-        if self.winches.answering:
-            measure(self._table, ropes.behind, places, rates, spans)
-            path, path_rate = ropes.along(spans.length), ropes.along(spans.rate)
-        self._wind(*self.winches.at(time, ropes, path, path_rate))
-        self._turned_at = time
+    def find_left(self, time: float) -> None:
+        """Find which share of a change of path stretches each rope, whose winches answer."""
+        self.roped.left[:] = self.winches.stiffness_left(time, self.ropes, *self._paths())
+
+    def _paths(self) -> tuple[Array, Array]:
+        spans = self.roped.spans
+        return self.ropes.along(spans.length), self.ropes.along(spans.rate)
 
     def _wind(self, wound: Array, rate: Array) -> None:
         """Let the winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
-        self._drums = self._chain.drums(self.ropes, wound, rate)
-        self._enough = bool(self._drums.natural.min() > 0.0)
+        for own, found in zip(
+            self.roped.drums, self._chain.drums(self.ropes, wound, rate), strict=True
+        ):
+            own[:] = found
         self._turned = _Turned(wound, rate)
 
-    def factors(self, time: float) -> int:
-        """Number of factors in which tensions change in the state of the last ``pull``."""
-        spans, drums, slip = self._spans, self._drums, self._table.slip_speed
-        self._left = np.ones(len(drums.natural))
-        if self.winches.answering:
-            path, path_rate = self.ropes.along(spans.length), self.ropes.along(spans.rate)
-            self._left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
-        own = (1.0 - spans.exponent**2) / slip
-        turning = self._turning
-        found = turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
-        self._slopes = felt_slopes(found, own, slip)
-        call("show", self.ropes.behind, spans, self._laws, self._laws.slopes)
-        play(self._laws.slopes)
-        if self._laws.moves:
-            by_speed, decays = self._laws.slopes.rows[_BY_SPEED], self._laws.decays.rows[_DECAY]
-            self._slopes = with_law_slopes(self._slopes, spans.exponent, by_speed, decays, slip)
-        return factors_needed(self._table, self._slopes)
-
-    def add_tangent(
-        self,
-        arms: Arms,
-        rates: Array,
-        rate_by_place: float,
-        count: int,
-        fronts: Fronts,
-        border: Border,
-    ) -> None:
-        """Add to the fronts and, for each of so many factors, to the last columns and rows of a
-        border; ``rate_by_place`` is the derivative of the points' rates after places, 1/s.
-        """
-        add_cables(
-            self.lines, self._mesh, arms, self._table, self._drums, self._laws, self._slopes,
-            self._spans, rates, self._left, rate_by_place,
-            count, fronts, border,
-        )  # fmt: skip
-
     def _retable(self) -> None:
-        self._table = self._chain.table(self.ropes, self.lines.span)
-        self._spans = Spans.empty(self.ropes)
+        table = self._chain.table(self.ropes, self.lines.span)
+        self.roped = Roped.of(self.ropes, table, self.points, self._unknowns, hub=self._hub)
         self._turned_at = math.nan
 
 

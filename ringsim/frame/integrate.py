@@ -29,58 +29,6 @@ from ringsim.stepping.instant import Instant, Memory, Strained
 from ringsim.stepping.run import Run
 from ringsim.variables import Outcome
 
-# Broyden's method: what a tangent that is not renewed learns from the changes made with it.
-#
-# With changes s_0 ... s_n since the tangent was factored, and z = -K^-1 g of the newest residual,
-#
-#     z <- z + s_(j+1) (s_j . z) / (s_j . s_j),  j = 0 ... n - 1,
-#     s_(n+1) = z / (1 - (s_n . z) / (s_n . s_n))
-#
-# (the product form of the good Broyden update: Kelley, Iterative Methods for Linear and Nonlinear
-# Equations, SIAM 1995, section 7.3).  It costs some dot products, in which turns count by the way
-# that they move a length: sums of metres and radians would depend on the unit of length.
-
-
-_ALIKE = 0.7
-"""Largest share of the last change in the next one for which the update is made: a change that
-hardly differs from the last one says that the tangent is wrong there."""
-
-
-class Secants:
-    """The changes since a tangent."""
-
-    def __init__(self, lengths: Array) -> None:
-        """``lengths``, shape (unknowns,): by which turns become ways (m); 1 for what is one."""
-        self._metric = lengths**2
-        self._changes: list[Array] = []
-        self._squares: list[float] = []
-
-    def forget(self) -> None:
-        """Begin with a new tangent, or after a change that was not taken whole."""
-        self._changes, self._squares = [], []
-
-    def corrected(self, change: Array) -> Array:
-        """The change to make instead of the tangent's own, shape (unknowns,)."""
-        last = len(self._changes) - 1
-        for n, square in enumerate(self._squares):
-            share = float((self._metric * self._changes[n]) @ change) / square
-            if n < last:
-                change = change + share * self._changes[n + 1]
-            elif share < _ALIKE:
-                change = change / (1.0 - share)
-        self._changes.append(change)
-        self._squares.append(float((self._metric * change) @ change))
-        return change
-
-
-# Time integration of a scene in joint coordinates; ``ringsim.stepping`` decides on the steps.
-
-
-_MOST = 25
-"""Newton iterations a step at most, as of the full model."""
-_FALL = 0.3
-"""Ratio of successive residuals above which the tangent is renewed: a tangent costs two iterations,
-and secants teach the old one."""
 _EASY = 3
 """Newton iterations up to which a step was easy: the motion is smooth, and a cubic foretells it
 better than a parabola; where ropes swing within a step it does worse."""
@@ -112,7 +60,9 @@ class Integration(Run):
     def __init__(self, model: FrameModel, watch: Watch | None = None) -> None:
         scene, elements = model.scene, len(model.mesh.length)
         super().__init__(scene, watch)
-        self._model, self._cables, self._now = model, model.cables, model.start
+        self._model, self._cables = model, model.cables
+        # Two states take turns: the core has seen their tables.
+        self._now, self._next = model.start.copy(), model.start.copy()
         self._energy = EnergyMeter(model)
         self._moves: list[tuple[float, Array]] = []
         self._easy = False
@@ -169,13 +119,14 @@ class Integration(Run):
 
     def _begin(self, now: Instant) -> None:
         """Let joints and winches begin a step."""
-        self._model.laws.begin()
+        self._model.laws.rubbing.forget()
         super()._begin(now)
 
     def _try(self, step: float) -> tuple[State, Instant]:
         """The state a step later."""
         time = self._control.now.time + step
-        after = self._now.copy()
+        after = self._next
+        after.take(self._now)
         self._move(after, self._guess(step))
         self._strains = self._damped(step, after)
         self._newton(time, step, after)
@@ -194,39 +145,13 @@ class Integration(Run):
         return Strains(after.strains, (r**2 / (1.0 + r) * before - (1.0 + r) * now) / step, lead)
 
     def _newton(self, time: float, step: float, after: State) -> None:
-        """Newton's method with secants, in place.
-
-        Changes are taken whole.  Where forces bend sharply, as of stops and of dry friction that
-        turns round, the residual may grow for an iteration: what it finds there is what tells the
-        way back (``ringsim.stepping.locks``), and shorter changes would only find it later.
-        """
-        model, factored, last = self._model, None, math.inf
-        secants = Secants(model.lengths)
-        tolerance = model.tolerance(step, self._strains)
-        for taken in range(_MOST):
-            try:
-                g = model.residual(time, step, self._now, after, self._strains)
-            except ValueError as error:
-                raise NoBalanceError(str(error)) from error
-            forces = g / model.lengths
-            norm = math.sqrt(forces @ forces)
-            if not math.isfinite(norm):
-                raise NoBalanceError("the state is not finite")
-            if norm <= tolerance:
-                self._easy = taken <= _EASY
-                return
-            self.history.newton_iterations += 1
-            if factored is None or norm > _FALL * last:
-                factored = model.tangent(time, step, after, self._strains)
-                secants.forget()
-                self.history.jacobians += 1
-                if not factored.sound:
-                    raise NoBalanceError("a pivot of the tangent is too small")
-            last = norm
-            self._move(after, secants.corrected(factored.solve(g)))
-        raise NoBalanceError(
-            f"Newton's residual is {norm:.3g} N after {_MOST} iterations, step {step:.3g} s"
-        )
+        """Newton's method with secants, in place."""
+        found = self._model.balance(time, step, self._now, after, self._strains)
+        self.history.newton_iterations += found.iterations
+        self.history.jacobians += found.tangents
+        if found.why:
+            raise NoBalanceError(found.why)
+        self._easy = found.iterations <= _EASY
 
     def _move(self, state: State, by: Array) -> None:
         move(self._model.mesh, state.pose, by[: self._model.mesh.unknowns])
@@ -245,9 +170,9 @@ class Integration(Run):
         moved = self._between(before, after) / step
         # Before rest it came as it leaves: the even motion through the first state.
         self._moves = [*(self._moves[-2:] or [(step, -moved)]), (step, moved)]
-        self._steps = [(step, before.strains)]
+        self._steps = [(step, before.strains.copy())]
         straighten(after.pose)
-        self._now = after
+        self._now, self._next = after, before
         self._accepted(found)
 
     def _between(self, before: State, after: State) -> Array:
@@ -341,7 +266,7 @@ class Storing(Integration):
             "state": now.memory(),
             "latches": self._latches.memory(),
             "energy": self._energy.memory(),
-            "reaction": getattr(model, "reaction", None),
+            "reaction": model.reaction,
             "settings": [[*key, value] for key, value in self._settings().items()],
         }
         if cables is not None and now.chain is not None:
@@ -354,12 +279,10 @@ class Storing(Integration):
     def recall(self, memory: Memory) -> None:
         """See ``Remembering``; faults and cables are left to ``_go_on``."""
         super().recall(memory)
-        self._now = self._model.start.copy()
         self._now.recall(memory["state"])
         self._latches.recall(memory["latches"])
         self._energy.recall(memory["energy"])
-        if memory["reaction"] is not None:
-            self._model.reaction = memory["reaction"]
+        self._model.reaction[:] = memory["reaction"]
 
     def _go_on(self, start: StoredState) -> None:
         """Take a stored state over."""
@@ -393,7 +316,7 @@ class Storing(Integration):
         """Let all faults have struck that had, but those that are gone."""
         model = self._model
         # Those of the start have struck this model already, where it stood then.
-        model.laws = JointLaws(model.skeleton, model.openings)
+        model.begin_laws(JointLaws(model.skeleton, model.openings))
         switches, planes = model.laws.switches, self._scene.structure.planes
         unknown = np.full(self._control.now.angles.shape, math.nan)
         own = Struck(planes, switches, unknown)

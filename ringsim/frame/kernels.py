@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.core.library import call
-from ringsim.frame.elimination import Fronts
 from ringsim.frame.mesh import Mesh
 from ringsim.layout.bodies import Array
 
@@ -82,7 +81,7 @@ def place_points(mesh: Mesh, pose: Pose, out: Array) -> None:
 
 
 def room_for_loads(mesh: Mesh) -> Array:
-    """Room for what elements hold, from ``add_forces`` to ``begin_tangent``."""
+    """Room for what elements hold, from ``add_forces`` to its derivative."""
     return np.zeros(call("room_for_loads", len(mesh.length)))
 
 
@@ -95,17 +94,6 @@ def add_forces(
     points, (p, 3).
     """
     call("add_forces", mesh, pose, points, accelerations, strains, loads, g)
-
-
-def begin_tangent(
-    mesh: Mesh, pose: Pose, points: Array, accelerations: Array, loads: Array, lead: float,
-    by_place: float, fronts: Fronts,
-) -> None:  # fmt: skip
-    """Set the fronts to the derivative of ``add_forces``, which has kept ``loads``; ``lead`` and
-    ``by_place`` are those of rates of strains after strains (1/s), and of accelerations after
-    places (1/s^2).
-    """
-    call("begin_tangent", mesh, pose, points, accelerations, loads, lead, by_place, fronts)
 
 
 def energies_of(mesh: Mesh, velocities: Array, strains: Array) -> tuple[float, float]:

@@ -1,19 +1,19 @@
 """Laws of parts and cables as lists of operations, which the core plays back."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from ringsim.core.library import call
+from ringsim.core.turning import Seen
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Skeleton
 from ringsim.layout.bodies import Array, JointOpening
 from ringsim.parts.joints import JointFriction
 from ringsim.parts.laws import AngleLaw, Reaction, Rub, Switches
 from ringsim.parts.persection import at_section
 from ringsim.refusal import InputError
-from ringsim.stepping.locks import Turning
 
 # Laws of ringsim.parts and ringsim.cable as lists of operations, which the core plays (laws.c).
 #
@@ -160,7 +160,8 @@ _ON, _SETTING = 2, 3
 class Acting(NamedTuple):
     """Laws on coordinates x = sense * angle, all shape (n,), and the angles' numbers.
 
-    The first ``soft`` of them have slopes of their own; behind them is dry friction (``Turning``).
+    The first ``soft`` of them have slopes of their own; behind them is dry friction
+    (``ringsim.core.turning``).
     """
 
     tape: Tape
@@ -219,7 +220,8 @@ class JointLaws:
     """All torques of a layout's joints.
 
     ``switches`` say which laws act, with which settings; ``damping`` is the torque over the rate of
-    each angle where friction is linear, N m s/rad, and ``acting`` are all other laws.
+    each angle where friction is linear, N m s/rad, ``acting`` are all other laws, and ``rubbing``
+    is what Newton's iterates tell of dry friction.
     """
 
     def __init__(self, skeleton: Skeleton, openings: Openings) -> None:
@@ -227,7 +229,7 @@ class JointLaws:
         self.switches = Switches(layout.angle_laws)
         self.damping = np.zeros(len(skeleton.angles))
         self._openings = openings
-        self._friction: list[tuple[JointFriction, Indices, Array, Turning]] = []
+        self._friction: list[tuple[JointFriction, Indices, Array]] = []
         for rub in layout.rubs:
             self._rub(rub, skeleton)
         laws: list[tuple[Law, object, Indices, Array]] = []
@@ -235,7 +237,7 @@ class JointLaws:
             at = tuple(np.array(law.places).T)
             laws.append((_switched(law), law.record, own[at], sense[at]))
         soft = sum(each.size for _, _, each, _ in laws)
-        for friction, where, senses, _ in self._friction:
+        for friction, where, senses in self._friction:
             laws.append((_rubbing(friction), friction, where, senses))
         self.acting = Acting(
             taped([(law, each.shape, record) for law, record, each, _ in laws], 4, 3),
@@ -243,6 +245,7 @@ class JointLaws:
             np.concatenate([np.zeros(0), *(senses for *_, senses in laws)]),
             soft,
         )
+        self.rubbing = Seen.empty(len(self.acting.own) - soft)
         self.follow()
 
     def _rub(self, rub: Rub, skeleton: Skeleton) -> None:
@@ -256,28 +259,13 @@ class JointLaws:
         if rest:
             own = np.array([skeleton.angle_of[rub.joints[k]] for k in rest])
             senses = np.array([skeleton.angles[n].sense for n in own])
-            self._friction.append((rub.of(rest), own, senses, Turning()))
+            self._friction.append((rub.of(rest), own, senses))
 
     def follow(self) -> None:
         """Take over what faults and latches have changed; due after each change."""
         rows, last = self.acting.tape.rows, self.acting.soft
         rows[_ON, :last] = np.concatenate([np.zeros(0), *self.switches.on])
         rows[_SETTING, :last] = np.concatenate([np.zeros(0), *self.switches.setting])
-
-    def begin(self) -> None:
-        """Begin a step."""
-        for *_, turning in self._friction:
-            turning.forget()
-
-    def note(self, rates: Array) -> None:
-        """Remember an iterate for slopes of dry friction: rates of the angles, rad/s."""
-        for friction, own, sense, turning in self._friction:
-            turning.note(friction, sense * rates[own])
-
-    def dry_slopes(self, rates: Array) -> Iterator[tuple[Indices, Array]]:
-        """Angles that rub dry, and derivatives of their torques after their rates, N m s/rad."""
-        for friction, own, sense, turning in self._friction:
-            yield own, turning.tangents(friction, sense * rates[own], friction.torque)
 
     def passing(self, angles: Array, rates: Array) -> Torques:
         """What all torques take and store."""

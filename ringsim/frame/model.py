@@ -2,15 +2,18 @@
 
 import math
 import sys
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.frame.cables import Arms, FrameCables, no_lines
-from ringsim.frame.elimination import Border, Factored, Fronts
+from ringsim.core.library import ASKED, NOT_ASKED, call, empty_of
+from ringsim.core.turning import Seen
+from ringsim.frame.cables import Arms, FrameCables, Laws, Lines, Roped
+from ringsim.frame.elimination import Border, Fronts
 from ringsim.frame.kernels import Pose, Strains, add_forces, move, room_for_loads
-from ringsim.frame.laws import JointLaws, Openings
-from ringsim.frame.mesh import CURE, NOT_HERE, Skeleton, mesh_of
+from ringsim.frame.laws import Acting, JointLaws, Openings
+from ringsim.frame.mesh import CURE, NOT_HERE, Mesh, Skeleton, mesh_of
 from ringsim.frame.springs import STIFFNESS, BeamSlide, RigidSlide, Slide, Web
 from ringsim.frame.state import (
     Coefficients,
@@ -18,9 +21,6 @@ from ringsim.frame.state import (
     Hanging,
     Held,
     State,
-    balance,
-    differentiate,
-    put_in_place,
 )
 from ringsim.layout.bodies import Array
 from ringsim.layout.layout import layout_of
@@ -36,6 +36,45 @@ from ringsim.rigid.statics import (
 )
 from ringsim.scene import Scene
 
+# What newton.c asks for, and how it ends.
+_WINCHES, _PARTS = 1, 2
+_WIND, _FORCES, _ANSWER, _SLOPES = range(4)
+_BALANCED, _UNBALANCED, _ENDLESS, _SMALL_PIVOT, _NO_TENSIONS, _RAISED = range(6)
+
+
+class System(NamedTuple):
+    """What the core sees of a model: its parts, and room for what it finds in a step: what elements
+    keep, residual, changes since a tangent, and ``FrameModel.reaction``; ``lengths`` and their
+    squares by which unknowns are compared.
+    """
+
+    mesh: Mesh
+    lines: Lines
+    held: Held
+    joints: Acting
+    rubbing: Seen
+    web: Web
+    coefficients: Coefficients
+    laws: Laws
+    arms: Arms
+    fronts: Fronts
+    loads: Array
+    kept: Array
+    lengths: Array
+    weights: Array
+    g: Array
+    changes: Array
+    reaction: Array
+    hub: bool
+
+
+class Balanced(NamedTuple):
+    """Newton's iterations in a step and its tangents; why it has failed, or nothing."""
+
+    iterations: int
+    tangents: int
+    why: str
+
 
 class FrameModel:
     """All parts of a scene on their unknowns.
@@ -50,6 +89,10 @@ class FrameModel:
         What putting the structure together has left in its rods, J.
     with_hub, size
         Whether a net has a hub; number of unknowns: those of the mesh and the hub's three.
+    system, unroped
+        Its tables; that of ropes where there are none.
+    others
+        What the core does not know: it adds itself to residual and tangent.
     reaction
         What was last out of balance on the unknowns that do not move, N and N m.
     """
@@ -71,7 +114,7 @@ class FrameModel:
         mesh = self.mesh
         self.openings = Openings.of(skeleton)
         self.laws = JointLaws(skeleton, self.openings)
-        self.with_hub, self._strung = self.layout.hub is not None, False
+        self.with_hub = self.layout.hub is not None
         self.web = Web.of(self.layout, mesh)
         self.coefficients = Coefficients.of(scene.solver.spectral_radius)
         angle = np.array([one.start for one in skeleton.angles])
@@ -85,13 +128,13 @@ class FrameModel:
             RigidSlide(mesh, top, low, STIFFNESS * stiffest, turns * scene.structure.reach)
             for top, low, turns in skeleton.slides
         ]
-        self._beam_slides: list[Slide] = []
+        self.others: list[BeamSlide | Hanging] = []
+        self.slides: list[Slide] = [*slides]
         if beam is not None:
             nodes = [(end.frame, end.axes) for end in skeleton.beam]
-            self._beam_slides.append(
-                BeamSlide(mesh, nodes, boom[0].length, beam.low.body, STIFFNESS * stiffest)
-            )
-        self.slides: list[Slide] = [*slides, *self._beam_slides]
+            bent = BeamSlide(mesh, nodes, boom[0].length, beam.low.body, STIFFNESS * stiffest)
+            self.others.append(bent)
+            self.slides.append(bent)
         self.size = mesh.unknowns + 3 * self.with_hub
         # Forces and torques, ways and turns are compared by a length of the structure: sums of
         # their squares as they are would depend on the unit of length.
@@ -140,15 +183,31 @@ class FrameModel:
             weighs=self.layout.gravity is not None,
             gravity=self.gravity,
         )
-        self._held_loads = room_for_loads(mesh)
+        self._kept = room_for_loads(mesh)
         self._string_spots = mesh.home[ends][:, None] + np.arange(3)
-        self._lines = no_lines() if self.cables is None else self.cables.lines
+        self._lines = empty_of(Lines) if self.cables is None else self.cables.lines
         self._arms = Arms.empty(lines)
         self.start = self._started(pose)
         self.hanging = None if hung is None else Hanging(hung, mesh, self.start.place.hung.copy())
+        if self.hanging is not None:
+            self.others.append(self.hanging)
         self.reaction = np.zeros(len(mesh.fixed))
         self._begun = self.start.place.points.copy()
+        border = Border.empty(mesh.unknowns, 0, self.with_hub)
+        self.unroped = empty_of(Roped)._replace(border=border)
         self._fronts = Fronts.empty(mesh)
+        self.begin_laws(self.laws)
+
+    def begin_laws(self, laws: JointLaws) -> None:
+        """Go on with the laws of joints as faults have left them."""
+        self.laws = laws
+        of_pulleys = empty_of(Laws) if self.cables is None else self.cables.laws
+        self.system = System(
+            self.mesh, self._lines, self._held, laws.acting, laws.rubbing, self.web,
+            self.coefficients, of_pulleys, self._arms, self._fronts, self.loads, self._kept,
+            self.lengths, self.lengths**2, np.zeros(self.size),
+            np.zeros((call("most_iterations"), self.size)), self.reaction, self.with_hub,
+        )  # fmt: skip
 
     def turn_loads(self) -> None:
         """Let the forces of ``Loads`` act the other way round."""
@@ -185,59 +244,69 @@ class FrameModel:
         ropes = rope_reach(self.scene, self.coefficients.rate_by_place(step))
         return max(self._tolerance, reached, 4.0 * sys.float_info.epsilon * ropes)
 
-    def residual(
+    def balance(
         self, time: float, step: float, start: State, now: State, strains: Strains
-    ) -> Array:
-        """Forces out of balance on all unknowns, shape (size,); ValueError if the cables have no
-        answer.
-        """
-        g = -self.loads
-        inner = g[: self.mesh.unknowns]
-        self._strung = balance(
-            self.mesh, self._lines, self._held, self.laws.acting, self.web, self.coefficients,
-            step, start.followed, now.pose, now.hub, self._arms, now.followed, strains,
-            self._held_loads, g,
-        )  # fmt: skip
-        self.laws.note(now.rate.angles)
-        for slide in self._beam_slides:
-            slide.hold(now.pose, inner)
-        if self.hanging is not None:
-            self.hanging.push(now, inner)
-        if self.cables is not None:
-            self.cables.pull(time, self._arms, now.place.lines, now.rate.lines, inner)
-        if len(self.mesh.fixed):
-            self.reaction = inner[self.mesh.fixed]
-            inner[self.mesh.fixed] = 0.0
-        return g
+    ) -> Balanced:
+        """Bring a state into balance at a time (s), a step (s) after a start, in place."""
+        told, places, rates = np.zeros(3), now.place.lines, now.rate.lines
+        tolerance, why = self.tolerance(step, strains), ""
+        given = start.table, now.table, strains, tolerance, told
+        try:
+            how = self.core("balance_step", time, step, now, *given)
+            if how == _NO_TENSIONS and self.cables is not None:
+                self.cables.refuse(places, rates)
+        except ValueError as error:  # the winches or the ropes have no answer
+            how, why = _NO_TENSIONS, str(error)
+        iterations, tangents, norm = int(told[0]), int(told[1]), float(told[2])
+        words = {
+            _UNBALANCED: f"Newton's residual is {norm:.3g} N after {iterations} iterations, "
+            f"step {step:.3g} s",
+            _ENDLESS: "the state is not finite",
+            _SMALL_PIVOT: "a pivot of the tangent is too small",
+        }
+        return Balanced(iterations, tangents, words.get(how, why))
 
-    def tangent(self, time: float, step: float, now: State, strains: Strains) -> Factored:
-        """The derivative of the last residual after the unknowns, factored."""
-        mesh, cables, strung, fronts = self.mesh, self.cables, self._strung, self._fronts.whole
+    def core(self, name: str, time: float, step: float, now: State, *given: Any) -> int:
+        """Call a function of newton.c for a state at a time (s), a step (s) after another one;
+        raises what Python refuses.
+        """
+        cables, others = self.cables, self.others
+        roped, asks = self.unroped, bool(others) * _PARTS
+        if cables is not None:
+            cables.turn(time)
+            roped, asks = cables.roped, asks | cables.winches.answering * _WINCHES
+        if not asks:
+            return int(call(name, self.system, roped, 0, NOT_ASKED, step, *given))
+        inner, fronts = self.system.g[: self.mesh.unknowns], self.system.fronts.whole
         by_rate = self.coefficients.rate_by_place(step)
         by_place = self.coefficients.acceleration_by_place(step)
-        factors = 0 if cables is None else cables.factors(time)
-        alone = self.with_hub and not strung
-        hub_inertia = self.web.hub_mass * by_place if alone else math.nan
-        border = Border.empty(mesh.unknowns, factors, strung, hub_inertia)
-        differentiate(
-            mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, self._held_loads,
-            strains.lead, by_rate, by_place, self._fronts, border,
-        )  # fmt: skip
-        for own, slopes in self.laws.dry_slopes(now.rate.angles):
-            front, spot = mesh.angle_local[own].T
-            fronts[front, spot, spot] += by_rate * slopes
-        for slide in self._beam_slides:
-            slide.add_tangent(now.pose, fronts)
-        if self.hanging is not None:
-            self.hanging.add_tangent(now, by_rate, by_place, fronts)
-        if cables is not None:
-            cables.add_tangent(self._arms, now.rate.lines, by_rate, factors, self._fronts, border)
-        return Factored(mesh, self._fronts, border)
+        raised: list[BaseException] = []
+
+        def answer(what: int) -> int:
+            # Nothing may be raised into C: it stops, and what was raised goes on behind it.
+            try:
+                if what == _WIND and cables is not None:
+                    cables.answer(time)
+                elif what == _ANSWER and cables is not None:
+                    cables.find_left(time)
+                for other in others:
+                    if what == _FORCES:
+                        other.push(now, inner)
+                    elif what == _SLOPES:
+                        other.add_tangent(now, by_rate, by_place, fronts)
+            except BaseException as error:
+                raised.append(error)
+            return len(raised)
+
+        how = int(call(name, self.system, roped, asks, ASKED(answer), step, *given))
+        if raised:
+            raise raised[0]
+        return how
 
     def _place(self, state: State) -> None:
         """Places of all followed coordinates at the state's pose."""
-        put_in_place(
-            self.mesh, self._lines, self._held, state.pose, state.hub, self._arms,
+        call(
+            "put_in_place", self.mesh, self._lines, self._held, state.pose, state.hub, self._arms,
             state.followed.place,
         )  # fmt: skip
 
@@ -263,7 +332,7 @@ class FrameModel:
             held = Strains(state.strains, np.zeros_like(state.strains), 0.0)
             points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
             still = np.zeros_like(points)
-            add_forces(self.mesh, pose, points, still, held, self._held_loads, unloaded)
+            add_forces(self.mesh, pose, points, still, held, self._kept, unloaded)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)

@@ -66,7 +66,7 @@ class Readings(Meters):
         state, count = self._state, len(self.layout.bodies)
         velocities = self._of_bodies @ state.rate.points
         velocities[self._model.web.ends] = state.rate.ends
-        return Bodies(state.pose.place[:count], velocities, state.pose.axes[:count])
+        return Bodies(state.pose.place[:count].copy(), velocities, state.pose.axes[:count].copy())
 
     def accelerations(self) -> Array:
         """Those of points with mass, in the same means."""
@@ -104,7 +104,7 @@ class Readings(Meters):
         if self.now.time == 0.0:  # nothing has been out of balance yet
             return first_reaction(self.layout, model.moving)
         if self.layout.supports:
-            return model.reaction.reshape(2, 3)
+            return model.reaction.reshape(2, 3).copy()
         own, craft = model.mesh.craft, self.layout.spacecraft
         if craft is None or not len(own):
             return None

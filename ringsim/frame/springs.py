@@ -10,6 +10,7 @@ from ringsim.core.library import call
 from ringsim.frame.kernels import Pose
 from ringsim.frame.laws import Law, Tape, taped
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
+from ringsim.frame.state import State
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.layout import Layout
 from ringsim.parts.laws import HUB as FREE
@@ -129,23 +130,6 @@ class Slide:
         """Energy of the spring, J."""
         return 0.5 * self._stiffness * self.size(pose) ** 2
 
-    def hold(self, pose: Pose, g: Array) -> None:
-        """Add its force to the residual."""
-        gap = self.at(pose)
-        forces = self._stiffness * (gap.sizes @ gap.rows)
-        for n, frame in enumerate(gap.frames):
-            k = self._mesh.home[frame]
-            g[k : k + 6] += forces[6 * n : 6 * n + 6]
-
-    def add_tangent(self, pose: Pose, fronts: Array) -> None:
-        """Add to the fronts; gaps are so small that how the rows turn does not matter."""
-        gap, mesh = self.at(pose), self._mesh
-        # Where a part holds one of the frames, it holds all of them.
-        front = int(mesh.frame_local[list(gap.frames), 0].min())
-        where = {int(spot): k for k, spot in enumerate(mesh.spots[front, : mesh.size[front]])}
-        places = [where[int(mesh.home[f]) + k] for f in gap.frames for k in range(6)]
-        fronts[front][np.ix_(places, places)] += self._stiffness * (gap.rows.T @ gap.rows)
-
 
 def aside(pose: Pose, top: int, low: int, reach: float) -> tuple[Array, Array]:
     """Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12).
@@ -210,6 +194,23 @@ class BeamSlide(Slide):
         # Along the curve the body is free.
         rows = (_ONE - np.outer(direction, direction)) @ rows
         return Gap(away, rows, (self._nodes[k][0], self._nodes[k + 1][0], self.low))
+
+    def push(self, state: State, g: Array) -> None:
+        """Add its force to the residual."""
+        gap = self.at(state.pose)
+        forces = self._stiffness * (gap.sizes @ gap.rows)
+        for n, frame in enumerate(gap.frames):
+            k = self._mesh.home[frame]
+            g[k : k + 6] += forces[6 * n : 6 * n + 6]
+
+    def add_tangent(self, state: State, by_rate: float, by_place: float, fronts: Array) -> None:
+        """Add to the fronts; gaps are so small that how the rows turn does not matter."""
+        gap, mesh = self.at(state.pose), self._mesh
+        # Where a part holds one of the frames, it holds all of them.
+        front = int(mesh.frame_local[list(gap.frames), 0].min())
+        where = {int(spot): k for k, spot in enumerate(mesh.spots[front, : mesh.size[front]])}
+        places = [where[int(mesh.home[f]) + k] for f in gap.frames for k in range(6)]
+        fronts[front][np.ix_(places, places)] += self._stiffness * (gap.rows.T @ gap.rows)
 
 
 _ONE = np.eye(3)

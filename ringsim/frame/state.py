@@ -6,13 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.cable.chain import ChainState
-from ringsim.core.library import call
-from ringsim.frame.cables import Arms, Lines
-from ringsim.frame.elimination import Border, Fronts
-from ringsim.frame.kernels import Pose, Strains
-from ringsim.frame.laws import Acting
+from ringsim.frame.kernels import Pose
 from ringsim.frame.mesh import Indices, Mesh
-from ringsim.frame.springs import Web
 from ringsim.layout.bodies import Array
 from ringsim.layout.layout import Hung
 from ringsim.parts.ground import Hold
@@ -73,7 +68,7 @@ class Followed(NamedTuple):
         return Followed(*(each.copy() for each in self))
 
 
-# Residual and tangent but for cables (balance.c).
+# What is followed, and what holds it (balance.c).
 
 
 class Held(NamedTuple):
@@ -95,43 +90,6 @@ class Held(NamedTuple):
     damping: Array
     weighs: bool
     gravity: Array
-
-
-def put_in_place(
-    mesh: Mesh, lines: Lines, held: Held, pose: Pose, hub: Array, arms: Arms, place: Array
-) -> None:
-    """Places of all followed coordinates at a pose, and arms of the cables' points."""
-    call("put_in_place", mesh, lines, held, pose, hub, arms, place)
-
-
-def balance(
-    mesh: Mesh, lines: Lines, held: Held, joints: Acting, web: Web, coefficients: Coefficients,
-    step: float, start: Followed, pose: Pose, hub: Array, arms: Arms, now: Followed,
-    strains: Strains, loads: Array, g: Array,
-) -> bool:  # fmt: skip
-    """Follow a pose over a step, and add forces of rods, masses, slides, joints and strings to the
-    residual, shape (all unknowns,); returns whether a string pulls.  ``loads`` keep what elements
-    hold.
-    """
-    found = call(
-        "balance", mesh, lines, held, joints, web, coefficients, step, start, pose, hub, arms, now,
-        strains, loads, g,
-    )  # fmt: skip
-    return bool(found)
-
-
-def differentiate(
-    mesh: Mesh, held: Held, joints: Acting, web: Web, pose: Pose, now: Followed, loads: Array,
-    lead: float, by_rate: float, by_place: float, fronts: Fronts, border: Border,
-) -> None:  # fmt: skip
-    """Set the fronts, and the border's part of strings, if one pulls, to the derivative of
-    the last ``balance``; ``lead``, ``by_rate`` and ``by_place`` are those of rates of strains
-    after strains, and of rates and accelerations after places.
-    """
-    call(
-        "differentiate", mesh, held, joints, web, pose, now, loads, lead, by_rate, by_place,
-        border.strung, fronts, border.columns, border.rows, border.corner,
-    )  # fmt: skip
 
 
 # The state of a model: where everything stands and how it moves.
@@ -163,6 +121,14 @@ class Groups(NamedTuple):
         return cls(points.reshape(-1, 3), lines.reshape(-1, 3), angles, ends, hub, hung)
 
 
+class Moving(NamedTuple):
+    """What the core sees of a state."""
+
+    pose: Pose
+    hub: Array
+    followed: Followed
+
+
 class State:
     """A pose, the hub (m), strains of the elements and all followed coordinates; ``place``,
     ``rate`` and ``acceleration`` are views of these, ``chain`` the cables where a step has led.
@@ -172,6 +138,7 @@ class State:
         self, pose: Pose, hub: Array, strains: Array, followed: Followed, held: Held
     ) -> None:
         self.pose, self.hub, self.strains, self.followed = pose, hub, strains, followed
+        self.table = Moving(pose, hub, followed)
         self._held = held
         self.place = Groups.of(followed.place, held)
         self.rate = Groups.of(followed.rate, held)
@@ -198,6 +165,11 @@ class State:
         """Go on from a memory."""
         for own, value in zip(self._arrays(), memory["arrays"], strict=True):
             own[...] = value
+
+    def take(self, other: "State") -> None:
+        """Be where another state is."""
+        for own, value in zip(self._arrays(), other._arrays(), strict=True):
+            np.copyto(own, value)
 
     def _arrays(self) -> list[Array]:
         return [*self.pose, self.hub, self.strains, *self.followed]

@@ -16,15 +16,16 @@ import pytest
 from ringsim.core import library
 from ringsim.core.library import NotBuiltError, call
 from ringsim.core.tension import Drums, RopeTable, Spans
+from ringsim.core.turning import Seen
 from ringsim.frame import elimination
-from ringsim.frame.cables import Arms, Laws, Lines
-from ringsim.frame.elimination import Fronts
+from ringsim.frame.cables import Arms, Laws, Lines, Roped
+from ringsim.frame.elimination import Border, Fronts
 from ringsim.frame.kernels import Pose, Strains
 from ringsim.frame.laws import Acting, Tape, play, taped
 from ringsim.frame.mesh import Mesh
-from ringsim.frame.model import FrameModel
+from ringsim.frame.model import FrameModel, System
 from ringsim.frame.springs import Web
-from ringsim.frame.state import Coefficients, Followed, Held
+from ringsim.frame.state import Coefficients, Followed, Held, Moving
 from ringsim.scene import load_scene
 
 # It stands beside pyproject.toml, and needs setuptools, which a run does not.
@@ -53,8 +54,8 @@ def test_arrays_that_are_not_whole_or_of_other_numbers_are_refused() -> None:
 @pytest.mark.quick
 def test_tables_are_as_large_here_as_in_c_and_so_are_constants() -> None:
     tables = (
-        Mesh, Pose, Strains, Fronts, Tape, Acting, Web, Coefficients, Followed, Held, Lines, Arms,
-        Laws, RopeTable, Drums, Spans,
+        Mesh, Pose, Strains, Fronts, Border, Tape, Acting, Web, Coefficients, Followed, Moving,
+        Held, Lines, Arms, Laws, RopeTable, Drums, Spans, Seen, Roped, System,
     )  # fmt: skip
     sizes = {kind.__name__: library.words_of(kind) for kind in tables}
     assert sizes == {k.__name__: call("words_of_table", n) for n, k in enumerate(tables)}
@@ -95,8 +96,9 @@ def test_a_very_long_ring_has_a_tangent() -> None:
     model = FrameModel(scene)
     after = model.start.copy()
     strains = Strains(after.strains, np.zeros_like(after.strains), 1e3)
-    model.residual(1e-3, 1e-3, model.start, after, strains)
-    assert model.tangent(1e-3, 1e-3, after, strains).sound
+    given = after.table, strains
+    assert model.core("unbalance", 1e-3, 1e-3, after, model.start.table, *given) == 0
+    assert model.core("stiffen", 1e-3, 1e-3, after, *given) == 0
 
 
 @pytest.mark.quick

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.core.library import call
 from ringsim.frame.kernels import Strains, move
 from ringsim.frame.model import FrameModel
 from ringsim.frame.state import State
@@ -33,9 +34,12 @@ class Probe:
         elements = len(self.model.mesh.length)
         # Strains that rise from zero in the step.
         self._strains = Strains(self._now.strains, np.zeros((elements, 6)), 1.0 / self.step)
-        return np.asarray(
-            self.model.residual(self.time, self.step, self._start, self._now, self._strains)
-        )
+        return self._unbalanced(self._now, self._strains)
+
+    def _unbalanced(self, now: State, strains: Strains) -> Array:
+        given = self._start.table, now.table, strains
+        assert self.model.core("unbalance", self.time, self.step, now, *given) == 0
+        return self.model.system.g.copy()
 
     def _moved(self, by: Array) -> State:
         state, unknowns = self._start.copy(), self.model.mesh.unknowns
@@ -68,14 +72,17 @@ class Probe:
             state.hub += by[-3:]
         elements = len(self.model.mesh.length)
         strains = Strains(state.strains, np.zeros((elements, 6)), 1.0 / self.step)
-        return np.asarray(self.model.residual(self.time, self.step, self._start, state, strains))
+        return self._unbalanced(state, strains)
 
     def solved(self) -> Array:
         """What the factored tangent gives for unit residuals: minus its inverse."""
         self.residual(self.by)
-        factored = self.model.tangent(self.time, self.step, self._now, self._strains)
-        assert factored.sound
-        found = np.stack([factored.solve(unit) for unit in np.eye(self.model.size)], axis=1)
+        now, model, found = self._now, self.model, np.eye(self.model.size)
+        assert model.core("stiffen", self.time, self.step, now, now.table, self._strains) == 0
+        roped = model.unroped if model.cables is None else model.cables.roped
+        for row in found:
+            call("relax", model.system, roped, row)
+        found = found.T
         fixed = self.model.mesh.fixed
         assert not found[fixed].any()  # they stay
         found[fixed, fixed] = -1.0

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ringsim.core.library import call
 from ringsim.frame.elimination import Fronts
 from ringsim.frame.kernels import (
     Pose,
     Strains,
     add_forces,
-    begin_tangent,
     room_for_loads,
 )
 from ringsim.frame.mesh import Mesh
@@ -112,7 +112,7 @@ def tangent(ends: Ends) -> Array:
     """Their derivative, shape (12, 12)."""
     pose, points, _, loads, _ = _loaded(ends)
     fronts = Fronts.empty(_MESH)
-    begin_tangent(_MESH, pose, points, np.zeros((2, 3)), loads, 0.0, 0.0, fronts)
+    call("begin_tangent", _MESH, pose, points, np.zeros((2, 3)), loads, 0.0, 0.0, fronts)
     return fronts.whole[0, :12, :12].copy()
 
 

@@ -44,7 +44,7 @@ class Course:
         self.whole, self.rest, self.states = [], [], []
 
         def note(_: Any) -> None:
-            state = run._now
+            state = run._now.copy()
             self.whole.append(momenta(model, state))
             self.rest.append(momenta(model, state, craft=False))
             self.states.append(state)

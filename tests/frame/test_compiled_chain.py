@@ -10,22 +10,21 @@ from law_scenes import of_cables
 from ringsim.cable.chain import ChainState
 from ringsim.cable.friction import BearingFriction, CapstanFriction
 from ringsim.cable.records import Cable, Winch
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winding import ConstantWinding
 from ringsim.core.chain import Chain
+from ringsim.core.library import call
 from ringsim.core.tension import (
     PASSING,
     Drums,
     RopeTable,
     Spans,
     factors_needed,
-    felt_slopes,
     measure,
     slide,
     tension_changes,
     tighten,
 )
-from ringsim.frame.cables import spread_changes
 from ringsim.frame.integrate import Integration
 from ringsim.frame.model import FrameModel
 
@@ -114,7 +113,7 @@ def test_the_border_is_the_tangent_of_the_chain(
     truth, ropes, by_rate = case.evaluated(), case.ropes, 40.0
     left = LEFT[: len(ropes.starts)]
     own = truth.exponent_slopes
-    slopes = felt_slopes(own, own, truth.slip_speeds)
+    slopes = np.where(own * truth.slip_speeds > PASSING, own, 0.0)
     count, points = factors_needed(case.table, slopes), sum(POINTS)
     pulls, changes = np.zeros((count, ropes.spans)), np.zeros((count, ropes.spans, 3))
     log_slopes = truth.friction.by_angle(truth.pulleys)
@@ -123,7 +122,7 @@ def test_the_border_is_the_tangent_of_the_chain(
         1.0, by_rate, pulls, changes,
     )  # fmt: skip
     out = np.zeros((2, count, points, 3))
-    spread_changes(case.table, case.spans, pulls, changes, out)
+    call("spread_changes", case.table, case.spans, pulls, changes, out)
     found = np.einsum("kpi,kqj->piqj", *out)
 
     expected = np.zeros_like(found)
@@ -168,8 +167,22 @@ def test_the_border_is_the_tangent_of_the_chain(
 
 def test_a_pulley_that_was_seen_on_both_sides_is_felt_at_any_speed() -> None:
     """Full friction changes nothing, unless it has changed its sign within the step."""
-    slip = np.full(4, 1e-3)
-    speeds = np.array([300.0, 300.0, -160.0, 1e-4])
+    model = FrameModel(of_cables({}))
+    assert model.cables is not None
+    roped, slip = model.cables.roped, model.cables.roped.ropes.slip_speed
+    speeds = np.resize([300.0, 300.0, -160.0, 0.1 * slip[0], 160.0], len(slip))
+    before = np.resize([200.0, -300.0, 160.0, 0.2 * slip[0], 1e-9], len(slip))
+    for each in before, speeds:
+        call("note_rates", roped.seen, each)
+    roped.spans.speed[:], roped.spans.exponent[:] = speeds, np.tanh(speeds / slip)
+    roped.spans.tension[:], roped.spans.angle[:] = 1.0, 2.0
+    count = call("find_slopes", roped, model.system.laws)
     own = (1.0 - np.tanh(speeds / slip) ** 2) / slip
-    seen = np.maximum(own, [0.0, 2.0 / 600.0, 2.0 / 320.0, 0.0])
-    assert felt_slopes(seen, own, slip).tolist() == [0.0, *seen[1:]]
+    expected = np.resize([0.0, 2.0 / 600.0, 2.0 / 320.0, np.nan, 0.0], len(slip))
+    np.testing.assert_allclose(roped.slopes, np.where(np.isnan(expected), own, expected))
+    assert count == call("factors_needed", roped.ropes, roped.slopes) > 2
+
+
+def test_the_core_has_the_same_limits() -> None:
+    assert call("limit_of_ropes", 0) == SHORTEST
+    assert call("limit_of_ropes", 1) == PASSING

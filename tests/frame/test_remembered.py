@@ -18,6 +18,7 @@ from pydantic import BaseModel
 
 from law_scenes import STOPS, of_cables, of_forces
 from ringsim.cable.winches import Winches
+from ringsim.core.turning import Seen
 from ringsim.dataset import save
 from ringsim.frame.integrate import Storing
 from ringsim.frame.model import FrameModel
@@ -44,7 +45,7 @@ class Stopped(Storing):
 
 def differing(one: Any, other: Any, path: str = "") -> list[str]:
     """Where two trees of objects are not equal bit by bit; models and functions are left out."""
-    if isinstance(one, FrameModel) or callable(one):
+    if isinstance(one, (FrameModel, Seen)) or callable(one):  # what Newton sees is of one step
         return []
     if isinstance(one, np.ndarray):
         return [] if np.array_equal(one, other, equal_nan=one.dtype.kind == "f") else [path]
@@ -78,7 +79,7 @@ def inside(thing: Any) -> dict[Any, Any] | None:
     return own
 
 
-BEGUN_ANEW = "until", "_states", "_cables"
+BEGUN_ANEW = "until", "_states", "_cables", "_next"
 """Of cables see below: what they keep is of one step."""
 
 

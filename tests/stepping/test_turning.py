@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from ringsim.core.turning import Turning
 from ringsim.parts.joints import ViscousCoulombFriction
-from ringsim.stepping.locks import Turning
 
 pytestmark = pytest.mark.quick
 

@@ -2,9 +2,6 @@
 
 #include "core.h"
 
-/* Where groups of followed coordinates begin; see ringsim.frame.state. */
-enum { POINTS, LINES, ANGLES, ENDS, HUB, HUNG };
-
 /* Rates and accelerations of now from its places and where the step has started. */
 static void follow(const Coefficients *with, D step, const Followed *start, const Followed *now) {
     D beta = with->beta, gamma = with->gamma, alpha_m = with->alpha_m, alpha_f = with->alpha_f;
@@ -98,7 +95,7 @@ D passing_pairs(const Web *web, const D *lengths, I n_lengths, const D *along, I
 /* Add what resists at the bodies and, in the last three unknowns, at the hub; returns whether a
    string pulls at the hub. */
 static bool pull_pairs(const Web *web, const Mesh *mesh, const Held *held, const Followed *now, D *g,
-                       I n_g) {
+                       I size) {
     MEASURED(web, held, now);
     bool strung = false;
     feel(web, lengths, along, 0.0, 0.0);
@@ -109,7 +106,7 @@ static bool pull_pairs(const Web *web, const Mesh *mesh, const Held *held, const
         strung |= one < 0;
         Vec force = times(pull, vector(units + 3 * n));
         add_vector(g + mesh->home.at[web->ends.at[web->second.at[n]]], force);
-        add_vector(g + (one >= 0 ? mesh->home.at[web->ends.at[one]] : n_g - 3), times(-1.0, force));
+        add_vector(g + (one >= 0 ? mesh->home.at[web->ends.at[one]] : size - 3), times(-1.0, force));
     }
     return strung;
 }
@@ -230,18 +227,18 @@ static const D *inertial(const Held *held, const Followed *now, I points, D *roo
 }
 
 /* Follow a pose over a step, and add forces of rods, masses, slides, joints and strings to the
-   residual of all unknowns; returns whether a string pulls.  loads keep what elements hold. */
+   residual of all so many unknowns; returns whether a string pulls.  loads keep what elements hold. */
 bool balance(const Mesh *mesh, const Lines *lines, const Held *held, const Acting *joints,
              const Web *web, const Coefficients *coefficients, D step, const Followed *start,
-             const Pose *pose, const D *hub, I n_hub, const Arms *arms, const Followed *now,
-             const Strains *strains, D *loads, I n_loads, D *g, I n_g) {
+             const Pose *pose, const D *hub, const Arms *arms, const Followed *now,
+             const Strains *strains, D *loads, D *g, I size) {
     const I *cuts = held->cuts.at;
     I points = mesh->point_mass.n;
     D room[3 * points + 1];
-    put_in_place(mesh, lines, held, pose, hub, n_hub, arms, now->place.at, now->place.n);
+    put_in_place(mesh, lines, held, pose, hub, 0, arms, now->place.at, 0);
     follow(coefficients, step, start, now);
     add_forces(mesh, pose, now->place.at + cuts[POINTS], 0, inertial(held, now, points, room), 0,
-               strains, loads, n_loads, g, n_g);
+               strains, loads, 0, g, 0);
     const D *rates = now->rate.at + cuts[ANGLES];
     for (I n = 0; n < held->damping.n; n++)
         g[mesh->angle_home.at[n]] += held->damping.at[n] * rates[n];
@@ -250,23 +247,22 @@ bool balance(const Mesh *mesh, const Lines *lines, const Held *held, const Actin
     if (web->first.n == 0) return false;
     if (cuts[HUNG] > cuts[HUB])
         for (int i = 0; i < 3; i++)
-            g[n_g - 3 + i] += web->hub_mass * (now->acceleration.at[cuts[HUB] + i] - held->gravity.at[i]);
-    return pull_pairs(web, mesh, held, now, g, n_g);
+            g[size - 3 + i] += web->hub_mass * (now->acceleration.at[cuts[HUB] + i] - held->gravity.at[i]);
+    return pull_pairs(web, mesh, held, now, g, size);
 }
 
-/* Set the fronts, and the border's part of strings, if one pulls, to the derivative of the last
-   balance; lead, by_rate and by_place are those of rates of strains after strains, and of rates and
-   accelerations after places. */
+/* Set the fronts, and the part of strings, if one pulls, in a border of so many columns, to the
+   derivative of the last balance; lead, by_rate and by_place are those of rates of strains after
+   strains, and of rates and accelerations after places. */
 void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, const Web *web,
-                   const Pose *pose, const Followed *now, const D *loads, I n_loads, D lead, D by_rate,
-                   D by_place, I strung, const Fronts *fronts, D *columns, I n_columns, D *rows,
-                   I n_rows, D *corner, I n_corner) {
-    (void)n_rows, (void)n_corner;
+                   const Pose *pose, const Followed *now, const D *loads, D lead, D by_rate,
+                   D by_place, bool strung, const Fronts *fronts, D *columns, D *rows, D *corner,
+                   I wide) {
     const I *cuts = held->cuts.at;
-    I points = mesh->point_mass.n, wide = n_columns / mesh->unknowns;
+    I points = mesh->point_mass.n;
     D room[3 * points + 1];
     begin_tangent(mesh, pose, now->place.at + cuts[POINTS], 0, inertial(held, now, points, room), 0,
-                  loads, n_loads, lead, by_place, fronts);
+                  loads, 0, lead, by_place, fronts);
     add_slides(mesh, held, pose, fronts);
     for (I n = 0; n < held->damping.n; n++) {
         const I *local = mesh->angle_local.at + 2 * n;

@@ -113,13 +113,30 @@ typedef struct {
     D lead;
 } Strains;
 
-/* ringsim.frame.elimination.Fronts */
+/* ringsim.frame.elimination */
 typedef struct {
     Reals whole;
     Ints panels;
     Reals inverse;
     I columns;
 } Fronts;
+
+typedef struct {
+    Reals columns, rows, corner, alone;
+    Ints pivots, used;
+} Border;
+
+/* Length (m) below which a span is none. */
+static const D SHORTEST = 1e-9;
+
+/* Places of used: columns in use, and whether the first three are a hub's. */
+enum { WIDE_USED, STRUNG };
+
+/* ringsim.core.turning.Seen */
+typedef struct {
+    Reals last;
+    Ints back, stayed, begun;
+} Seen;
 
 /* ringsim.frame.laws */
 typedef struct {
@@ -151,6 +168,15 @@ typedef struct {
 typedef struct {
     Reals place, rate, acceleration, auxiliary;
 } Followed;
+
+/* Where groups of followed coordinates begin. */
+enum { POINTS, LINES, ANGLES, ENDS, HUB, HUNG };
+
+typedef struct {
+    Pose pose;
+    Reals hub;
+    Followed followed;
+} State;
 
 typedef struct {
     Ints cuts, ends, hung, top, low;
@@ -194,6 +220,33 @@ typedef struct {
     Reals length, rate, unit, angle, tension, share, exponent, speed;
 } Spans;
 
+/* ringsim.frame.cables.Roped */
+typedef struct {
+    Ropes ropes;
+    Ints behind;
+    Drums drums;
+    Spans spans;
+    Seen seen;
+    Reals slopes, left, pulls, changes, factors;
+    Border border;
+} Roped;
+
+/* ringsim.frame.model.System */
+typedef struct {
+    Mesh mesh;
+    Lines lines;
+    Held held;
+    Acting joints;
+    Seen rubbing;
+    Web web;
+    Coefficients with;
+    Laws laws;
+    Arms arms;
+    Fronts fronts;
+    Reals loads, kept, lengths, weights, g, changes, reaction;
+    I hub;
+} System;
+
 static inline Mat axes_of(const Pose *pose, I frame) { return matrix(pose->axes.at + 9 * frame); }
 
 static inline Vec place_of(const Pose *pose, I frame) { return vector(pose->place.at + 3 * frame); }
@@ -205,6 +258,9 @@ static inline D *front_of(const Fronts *fronts, I number) {
 static inline D *row_of(const Tape *tape, I row) { return tape->rows.at + row * tape->rows.each; }
 
 void play(const Tape *tape);
+void note_rates(const Seen *seen, const D *rates, I n);
+D rate_across(const Seen *seen, I k);
+D slope_between(const Seen *seen, I k, D rate, D own, D here, D there);
 void place_points(const Mesh *mesh, const Pose *pose, D *out, I n_out);
 void add_forces(const Mesh *mesh, const Pose *pose, const D *points, I n_points,
                 const D *accelerations, I n_accelerations, const Strains *strains, D *loads,
@@ -216,5 +272,28 @@ void place_lines(const Lines *lines, const Pose *pose, const Arms *arms, D *out)
 void push_joints(const Acting *acting, const D *angles, const D *rates, const Mesh *mesh, D *g);
 void add_joint_slopes(const Acting *acting, const D *angles, const D *rates, D by_rate,
                       const Mesh *mesh, const Fronts *fronts);
+void note_joints(const Acting *acting, const Seen *rubbing, const D *rates);
+void add_dry_slopes(const Acting *acting, const Seen *rubbing, const D *angles, const D *rates,
+                    D by_rate, const Mesh *mesh, const Fronts *fronts);
+bool balance(const Mesh *mesh, const Lines *lines, const Held *held, const Acting *joints,
+             const Web *web, const Coefficients *coefficients, D step, const Followed *start,
+             const Pose *pose, const D *hub, const Arms *arms, const Followed *now,
+             const Strains *strains, D *loads, D *g, I size);
+void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, const Web *web,
+                   const Pose *pose, const Followed *now, const D *loads, D lead, D by_rate,
+                   D by_place, bool strung, const Fronts *fronts, D *columns, D *rows, D *corner,
+                   I wide);
+D measure(const Ropes *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
+          I n_rates, const Spans *spans);
+D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g);
+I find_slopes(const Roped *roped, const Laws *laws);
+void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,
+                I wide, I first);
+void move(const Mesh *mesh, const Pose *pose, const D *step, I n_step);
+bool factor(const Mesh *mesh, const Fronts *fronts);
+void solve(const Mesh *mesh, const Fronts *fronts, D *x, I n_x);
+void solve_one(const Mesh *mesh, const Fronts *fronts, D *x, I n_x);
+bool close_border(const Mesh *mesh, const Fronts *fronts, const Border *border, I n);
+void cross_border(const Border *border, I unknowns, I n, bool strung, D *x);
 
 #endif

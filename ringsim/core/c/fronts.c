@@ -229,5 +229,60 @@ void solve_one(const Mesh *mesh, const Fronts *fronts, D *x, I n_x) {
     }
 }
 
+/* The border: factor its own block D - R^T K^-1 C, whose n columns are eights, with exchange of rows;
+   its columns C become K^-1 C.  False if it is singular. */
+bool close_border(const Mesh *mesh, const Fronts *fronts, const Border *border, I n) {
+    D *a = border->corner.at;
+    solve(mesh, fronts, border->columns.at, mesh->unknowns * n);
+    for (I u = 0; u < mesh->unknowns; u++) {
+        const D *column = border->columns.at + u * n, *row = border->rows.at + u * n;
+        for (I i = 0; i < n; i++)
+            if (row[i] != 0.0) /* most are none */
+                for (I j = 0; j < n; j += LANES)
+                    put(a + i * n + j, take(a + i * n + j) - row[i] * take(column + j));
+    }
+    for (I k = 0; k < n; k++) {
+        I best = k;
+        for (I i = k + 1; i < n; i++)
+            if (fabs(a[i * n + k]) > fabs(a[best * n + k])) best = i;
+        if (!(fabs(a[best * n + k]) > 0.0)) return false;
+        border->pivots.at[k] = best;
+        for (I j = 0; best != k && j < n; j++) {
+            D kept = a[k * n + j];
+            a[k * n + j] = a[best * n + j], a[best * n + j] = kept;
+        }
+        for (I i = k + 1; i < n; i++) {
+            D share = a[i * n + k] /= a[k * n + k];
+            if (share != 0.0)
+                for (I j = k + 1; j < n; j++) a[i * n + j] -= share * a[k * n + j];
+        }
+    }
+    return true;
+}
+
+/* A solution x of the fronts alone becomes that of all; behind the fronts' unknowns come, if it is
+   strung, those of a hub. */
+void cross_border(const Border *border, I unknowns, I n, bool strung, D *x) {
+    const D *a = border->corner.at;
+    D z[n];
+    memset(z, 0, sizeof z);
+    for (I u = 0; u < unknowns; u++)
+        for (I j = 0; j < n; j += LANES) put(z + j, take(z + j) - x[u] * take(border->rows.at + u * n + j));
+    for (I k = 0; strung && k < 3; k++) z[k] += x[unknowns + k];
+    for (I k = 0; k < n; k++) {
+        I best = border->pivots.at[k];
+        D own = z[best];
+        z[best] = z[k], z[k] = own;
+    }
+    for (I k = 0; k < n; k++)
+        for (I i = k + 1; i < n; i++) z[i] -= a[i * n + k] * z[k];
+    for (I k = n - 1; k >= 0; k--) {
+        z[k] /= a[k * n + k];
+        for (I i = 0; i < k; i++) z[i] -= a[i * n + k] * z[k];
+    }
+    for (I u = 0; u < unknowns; u++) x[u] -= product(border->columns.at + u * n, z, n);
+    for (I k = 0; strung && k < 3; k++) x[unknowns + k] = z[k];
+}
+
 /* What ringsim.frame.elimination counts with, too. */
 I constant_of_fronts(I number) { return (const I[]){PANEL, WIDE, EIGHT}[number]; }

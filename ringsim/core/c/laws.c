@@ -103,6 +103,52 @@ void add_joint_slopes(const Acting *acting, const D *angles, const D *rates, D b
     }
 }
 
+/* Dry friction: laws behind the soft ones. */
+
+static I dry(const Acting *acting) { return acting->own.n - acting->soft; }
+
+static D rate_of(const Acting *acting, const D *rates, I k) {
+    return acting->sense.at[acting->soft + k] * rates[acting->own.at[acting->soft + k]];
+}
+
+/* Remember an iterate's rates where joints rub dry. */
+void note_joints(const Acting *acting, const Seen *rubbing, const D *rates) {
+    I count = dry(acting);
+    D own[count + 1];
+    for (I k = 0; k < count; k++) own[k] = rate_of(acting, rates, k);
+    note_rates(rubbing, own, count);
+}
+
+/* Torques of dry friction at rates of its own. */
+static void rub(const Acting *acting, const D *at, D more, D *out) {
+    I count = dry(acting);
+    D *rate = row_of(&acting->tape, RATE) + acting->soft;
+    for (I k = 0; k < count; k++) rate[k] = at[k] + more;
+    play(&acting->tape);
+    memcpy(out, row_of(&acting->tape, DAMPING) + acting->soft, (size_t)count * sizeof(D));
+}
+
+/* Add their derivatives, as far as Newton has seen both sides; see turning.c. */
+void add_dry_slopes(const Acting *acting, const Seen *rubbing, const D *angles, const D *rates,
+                    D by_rate, const Mesh *mesh, const Fronts *fronts) {
+    I count = dry(acting);
+    if (count <= 0) return;
+    D at[count], across[count], here[count], there[count], ahead[count], behind[count];
+    for (I k = 0; k < count; k++)
+        at[k] = rate_of(acting, rates, k), across[k] = rate_across(rubbing, k);
+    feel(acting, angles, rates, 0.0, 0.0);
+    rub(acting, at, 0.0, here);
+    rub(acting, across, 0.0, there);
+    rub(acting, at, NUDGE, ahead);
+    rub(acting, at, -NUDGE, behind);
+    for (I k = 0; k < count; k++) {
+        const I *local = mesh->angle_local.at + 2 * acting->own.at[acting->soft + k];
+        D own = (ahead[k] - behind[k]) / (2.0 * NUDGE);
+        front_of(fronts, local[0])[local[1] * (fronts->columns + 1)] +=
+            by_rate * slope_between(rubbing, k, at[k], own, here[k], there[k]);
+    }
+}
+
 /* Add torques that dissipate to those of all angles; returns the energy stored, J. */
 D passing_joints(const Acting *acting, const D *angles, I n_angles, const D *rates, I n_rates,
                  D *lost, I n_lost) {

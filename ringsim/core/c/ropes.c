@@ -126,7 +126,7 @@ void of_ropes(const Ropes *ropes, const Drums *drums, const Spans *spans, D *out
 }
 
 /* Let laws see the pulleys (ringsim.cable.friction.Pulleys). */
-void show(const I *behind, I pulleys, const Spans *spans, const Laws *laws, const Tape *tape) {
+static void show(const I *behind, I pulleys, const Spans *spans, const Laws *laws, const Tape *tape) {
     D *angle = row_of(tape, 0), *speed = row_of(tape, 1), *tension = row_of(tape, 2);
     for (I j = 0; j < pulleys; j++) {
         D both = 0.5 * (spans->tension.at[behind[j] - 1] + spans->tension.at[behind[j]]);
@@ -136,7 +136,7 @@ void show(const I *behind, I pulleys, const Spans *spans, const Laws *laws, cons
 }
 
 /* Rows of the results of decays and of slopes, behind what laws see. */
-enum { DECAY = 3, BY_ANGLE = 3 };
+enum { DECAY = 3, BY_ANGLE = 3, BY_SPEED };
 
 /* Spans, with their tensions, at places and rates of the points; returns the least length, NaN if no
    tensions go with the friction. */
@@ -192,6 +192,36 @@ I factors_needed(const Ropes *ropes, const D *slopes, I pulleys) {
         count += own + 1 + (own > 0);
     }
     return count;
+}
+
+/* Slope of a pulley's friction over that at rest below which Newton's tangent does without it, unless
+   Newton has seen the pulley on both sides: see ringsim.core.tension. */
+static const D PASSING = 2e-4;
+
+/* What ringsim.cable.ropes and ringsim.core.tension count with, too. */
+D limit_of_ropes(I number) { return number == 0 ? SHORTEST : PASSING; }
+
+/* Slopes (s/m) of the pulleys' exponents after the ropes' speeds, with those of laws of speed, as far
+   as tangents need them; plays the laws' derivatives.  Returns the number of factors. */
+I find_slopes(const Roped *roped, const Laws *laws) {
+    const Ropes *ropes = &roped->ropes;
+    const Spans *spans = &roped->spans;
+    I pulleys = roped->behind.n;
+    D *slopes = roped->slopes.at;
+    show(roped->behind.at, pulleys, spans, laws, &laws->slopes);
+    play(&laws->slopes);
+    const D *decays = row_of(&laws->decays, DECAY), *by_speed = row_of(&laws->slopes, BY_SPEED);
+    for (I j = 0; j < pulleys; j++) {
+        D slip = ropes->slip_speed.at[j], exponent = spans->exponent.at[j], speed = spans->speed.at[j];
+        D own = (1.0 - exponent * exponent) / slip;
+        D there = tanh(rate_across(&roped->seen, j) / slip);
+        D found = slope_between(&roped->seen, j, speed, own, exponent, there);
+        slopes[j] = found * slip > PASSING || found > own ? found : 0.0;
+        if (!laws->moves) continue;
+        D more = fabs(exponent) * by_speed[j] / (decays[j] < -1e-300 ? decays[j] : -1e-300);
+        if (fabs(more) * slip > PASSING) slopes[j] += more;
+    }
+    return factors_needed(ropes, slopes, pulleys);
 }
 
 /* A pulley's friction changes all spans behind it, less their share of the path: how it changes with
@@ -343,11 +373,13 @@ static void pull_lines(const Lines *lines, const Mesh *mesh, const Arms *arms, c
 
 /* Tighten the spans at places and rates of the points, and add what resists the pull of spans
    between frames to the residual; returns the least length of a span, m. */
-D pull_cables(const Lines *lines, const Mesh *mesh, const Arms *arms, const Ropes *ropes,
-              const I *behind, I pulleys, const Drums *drums, const Laws *laws, const D *places,
-              I n_places, const D *rates, I n_rates, const Spans *spans, D *g, I n_g) {
-    (void)n_g;
-    D least = pull_tight(ropes, behind, pulleys, drums, laws, places, n_places, rates, n_rates, spans);
+D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g) {
+    const Mesh *mesh = &system->mesh;
+    const Lines *lines = &system->lines;
+    const Arms *arms = &system->arms;
+    const Spans *spans = &roped->spans;
+    D least = pull_tight(&roped->ropes, roped->behind.at, roped->behind.n, &roped->drums,
+                         &system->laws, places, 0, rates, 0, spans);
     for (I s = 0; s < lines->span.n; s++) {
         I span = lines->span.at[s];
         Vec force = times(spans->tension.at[span], vector(spans->unit.at + 3 * span));
@@ -363,17 +395,17 @@ D pull_cables(const Lines *lines, const Mesh *mesh, const Arms *arms, const Rope
     return least;
 }
 
-enum { END = 7, ENDS = 14 };
+enum { SIDE = 7, BOTH_SIDES = 14 };
 
 /* How the points at the ends of a span move with its unknowns, and what arms that turn under its
    constant pull add to the front. */
 static void turn_arms(const Lines *lines, const Arms *arms, const Spans *spans, I s, D *front,
-                      I columns, D legs[3][ENDS]) {
+                      I columns, D legs[3][BOTH_SIDES]) {
     I span = lines->span.at[s];
-    const I *local = lines->local.at + ENDS * s;
+    const I *local = lines->local.at + BOTH_SIDES * s;
     for (int side = 0; side < 2; side++) {
         I n = lines->near.at[s] + side;
-        int own = END * side;
+        int own = SIDE * side;
         D sign = 2.0 * side - 1.0;
         Vec arm = vector(arms->whole.at + 3 * n), swung = vector(arms->swung.at + 3 * n),
             axis = vector(arms->axis.at + 3 * n), swing = cross(axis, swung);
@@ -409,25 +441,25 @@ static void turn_arms(const Lines *lines, const Arms *arms, const Spans *spans, 
 /* Add how the pulls of spans between frames turn with the spans and the arms to the fronts. */
 static void add_line_tangent(const Lines *lines, const Arms *arms, const Spans *spans,
                              const Fronts *fronts) {
-    D legs[3][ENDS], pulled[3][ENDS];
+    D legs[3][BOTH_SIDES], pulled[3][BOTH_SIDES];
     I columns = fronts->columns;
     for (I s = 0; s < lines->span.n; s++) {
         I span = lines->span.at[s];
-        const I *local = lines->local.at + ENDS * s;
+        const I *local = lines->local.at + BOTH_SIDES * s;
         D *front = front_of(fronts, lines->front.at[s]);
         turn_arms(lines, arms, spans, s, front, columns, legs);
         /* T (1 - u u^T) / L: the tension turns with the span. */
         Vec unit = vector(spans->unit.at + 3 * span);
         D stiffness = spans->tension.at[span] / spans->length.at[span];
-        for (int j = 0; j < ENDS; j++) {
+        for (int j = 0; j < BOTH_SIDES; j++) {
             Vec leg = {legs[0][j], legs[1][j], legs[2][j]};
             Vec aside = times(stiffness, minus(leg, times(dot(unit, leg), unit)));
             pulled[0][j] = aside.x, pulled[1][j] = aside.y, pulled[2][j] = aside.z;
         }
-        for (int i = 0; i < ENDS; i++) {
+        for (int i = 0; i < BOTH_SIDES; i++) {
             if (local[i] < 0) continue;
             D *row = front + local[i] * columns;
-            for (int j = 0; j < ENDS; j++)
+            for (int j = 0; j < BOTH_SIDES; j++)
                 if (local[j] >= 0)
                     row[local[j]] += legs[0][i] * pulled[0][j] + legs[1][i] * pulled[1][j] +
                                      legs[2][i] * pulled[2][j];
@@ -454,21 +486,27 @@ void spread_changes(const Ropes *ropes, const Spans *spans, const D *pulls, I n_
 }
 
 /* Add how spans turn to the fronts, and how tensions change to the border's columns and rows, shape
-   (unknowns, columns), from the first on.  Zeros before: pulls, shape (count, spans), changes,
-   (count, spans, 3), and factors, (2, count, points, 3); a long ring's are too large for a stack. */
-void add_cables(const Lines *lines, const Mesh *mesh, const Arms *arms, const Ropes *ropes,
-                const Drums *drums, const Laws *laws, const D *slopes, I n_slopes, const Spans *spans,
-                const D *rates, I n_rates, const D *left, I n_left, D rate_by_place, D *pulls,
-                I n_pulls, D *changes, I n_changes, D *factors, I n_factors, const Fronts *fronts,
-                D *columns, I n_columns, D *rows, I n_rows, I first) {
-    (void)n_rows;
-    I points = lines->frame.n, count = points ? n_factors / (6 * points) : 0;
-    I wide = n_columns / mesh->unknowns;
-    tension_changes(ropes, drums, row_of(&laws->decays, DECAY), 0, row_of(&laws->slopes, BY_ANGLE), 0,
-                    slopes, n_slopes, spans, rates, n_rates, left, n_left, 1.0, rate_by_place, pulls,
-                    n_pulls, changes, n_changes);
-    spread_changes(ropes, spans, pulls, n_pulls, changes, n_changes, factors, n_factors);
-    add_line_tangent(lines, arms, spans, fronts);
-    pull_lines(lines, mesh, arms, factors, count, columns, wide, first);
-    pull_lines(lines, mesh, arms, factors + n_factors / 2, count, rows, wide, first);
+   (unknowns, wide), from the first on, in so many factors.  rates are those of the points (m/s),
+   rate_by_place the derivative of rates after places (1/s). */
+void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,
+                I wide, I first) {
+    const Mesh *mesh = &system->mesh;
+    const Lines *lines = &system->lines;
+    const Arms *arms = &system->arms;
+    const Laws *laws = &system->laws;
+    const Ropes *ropes = &roped->ropes;
+    const Spans *spans = &roped->spans;
+    I n = spans->length.n, all_points = 3 * count * lines->frame.n;
+    /* Room of the table: a long ring's would be too large for a stack. */
+    D *pulls = roped->pulls.at, *changes = roped->changes.at, *factors = roped->factors.at;
+    memset(pulls, 0, (size_t)(count * n) * sizeof(D));
+    memset(changes, 0, (size_t)(3 * count * n) * sizeof(D));
+    memset(factors, 0, (size_t)(2 * all_points) * sizeof(D));
+    tension_changes(ropes, &roped->drums, row_of(&laws->decays, DECAY), 0,
+                    row_of(&laws->slopes, BY_ANGLE), 0, roped->slopes.at, 0, spans, rates, 0,
+                    roped->left.at, 0, 1.0, rate_by_place, pulls, 0, changes, 0);
+    spread_changes(ropes, spans, pulls, count * n, changes, 0, factors, 2 * all_points);
+    add_line_tangent(lines, arms, spans, &system->fronts);
+    pull_lines(lines, mesh, arms, factors, count, roped->border.columns.at, wide, first);
+    pull_lines(lines, mesh, arms, factors + all_points, count, roped->border.rows.at, wide, first);
 }

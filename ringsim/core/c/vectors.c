@@ -82,8 +82,9 @@ const char *compiled_from(void) { return SOURCES; }
 #define WORDS(table) (I)(sizeof(table) / sizeof(I))
 
 I words_of_table(I number) {
-    const I words[] = {WORDS(Mesh), WORDS(Pose), WORDS(Strains), WORDS(Fronts), WORDS(Tape),
-                       WORDS(Acting), WORDS(Web), WORDS(Coefficients), WORDS(Followed), WORDS(Held),
-                       WORDS(Lines), WORDS(Arms), WORDS(Laws), WORDS(Ropes), WORDS(Drums), WORDS(Spans)};
+    const I words[] = {WORDS(Mesh), WORDS(Pose), WORDS(Strains), WORDS(Fronts), WORDS(Border),
+                       WORDS(Tape), WORDS(Acting), WORDS(Web), WORDS(Coefficients), WORDS(Followed),
+                       WORDS(State), WORDS(Held), WORDS(Lines), WORDS(Arms), WORDS(Laws), WORDS(Ropes),
+                       WORDS(Drums), WORDS(Spans), WORDS(Seen), WORDS(Roped), WORDS(System)};
     return words[number];
 }
