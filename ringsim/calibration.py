@@ -3,7 +3,7 @@
 import math
 from functools import cache
 
-from scipy.optimize import brentq
+import scipy
 
 from ringsim.cable.records import BarHalfBracket
 from ringsim.choice import kind_of
@@ -84,4 +84,4 @@ def opening_angle_for(scene: Scene, time: float) -> float:
             )
         found = excess(middle)
         low, high, slow = (middle, high, found) if found >= 0.0 else (low, middle, slow)
-    return float(brentq(excess, low, high, xtol=_CLOSE))
+    return float(scipy.optimize.brentq(excess, low, high, xtol=_CLOSE))

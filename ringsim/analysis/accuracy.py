@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from ringsim.analysis.engines import GROUPS, OUTPUTS, Errors
 from ringsim.analysis.ladder import FRAME, PATHS, STANDING, Rung
@@ -221,7 +221,7 @@ def typical_cost(seconds: Array, work: Array, rungs: Sequence[Rung]) -> Array:
         commonest = max(mine, key=mine.count)
         own = np.array([size == commonest for size in sizes]) & measured
         scale = 1.0 / np.maximum(seconds[own], 1e-9)  # relative errors count
-        shares, _ = nnls(work[own] * scale[:, None], np.ones(own.sum()))
+        shares, _ = scipy.optimize.nnls(work[own] * scale[:, None], np.ones(own.sum()))
         plain = work @ shares
         for size in set(mine) if (plain[own] > 0.0).all() else ():
             members = np.array([each == size for each in sizes]) & measured & (plain > 0.0)

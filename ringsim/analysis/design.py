@@ -1,5 +1,7 @@
 """How the samples of a campaign were placed, and what was read of them."""
 
+from __future__ import annotations
+
 import functools
 import hashlib
 import json
@@ -8,10 +10,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
@@ -25,6 +26,9 @@ from ringsim.sampling.designs.family import Design
 from ringsim.stepping.instant import Array
 from ringsim.tables import number_text
 from ringsim.variables import GOALS, Cause, Code, Fate, Status
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # The blocks of runs that designs for Sobol' indices and for screening are made of.
 
@@ -524,6 +528,8 @@ def open_stored(path: Path) -> xr.Dataset:
             elif inside:
                 cure = "no sample of it has run yet: give ringsim campaign the same file again"
             raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
+    import xarray as xr  # here, as in other files that runs load: it takes most of a second
+
     try:
         found = xr.open_dataset(file, engine="netcdf4")
         if (most := max(found.sizes.values(), default=0)) > _MOST_ENTRIES:

@@ -6,9 +6,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.stats import f, norm, rankdata, t
 
 from ringsim.analysis import intervals
 from ringsim.analysis.design import Blocks
@@ -18,7 +17,7 @@ from ringsim.stepping.instant import Array
 # Rank measures of dependence between columns and an output, with intervals.
 
 
-_WIDE = float(norm.ppf(0.5 + LEVEL / 2))
+_WIDE = float(scipy.stats.norm.ppf(0.5 + LEVEL / 2))
 _SPARE = 5
 """Samples beyond the number of inputs, at least, that a partial correlation takes."""
 _HALVINGS = 60
@@ -28,7 +27,7 @@ def centred_ranks(columns: Array) -> Array:
     """Ranks in every column less their mean; one by one, because all at once take much memory."""
     found = np.empty(columns.shape)
     for k, column in enumerate(columns.T):
-        found[:, k] = rankdata(column) - (len(column) + 1) / 2
+        found[:, k] = scipy.stats.rankdata(column) - (len(column) + 1) / 2
     return found
 
 
@@ -122,7 +121,7 @@ def largest_by_chance(samples: int, held: Array, among: int) -> Array:
     correction; infinite if too few samples are left.
     """
     free = np.maximum(samples - 2.0 - held, 0.0)
-    beyond = t.isf(chance_of_each(among) / 2, np.maximum(free, 1.0))
+    beyond = scipy.stats.t.isf(chance_of_each(among) / 2, np.maximum(free, 1.0))
     return np.asarray(np.where(free > 0, beyond / np.sqrt(free + beyond**2), np.inf))
 
 
@@ -251,7 +250,7 @@ class Bins:
         """Whether a line is fitted in each bin, along the ranks; else a mean."""
         if self.lined:
             bins = max(2, round(count ** (1 / 3)))
-            rank = rankdata(column) - 0.5
+            rank = scipy.stats.rankdata(column) - 0.5
             self.bin = np.minimum((rank * bins / count).astype(np.int64), bins - 1)
             self.place = rank * bins / count - self.bin - 0.5
         else:
@@ -321,8 +320,8 @@ def given_data_indices(bins: Bins, centred: Array) -> Array:
     """
     count, samples = len(centred), np.arange(len(centred))
 
-    def by_bin(weight: Array) -> csr_array:
-        return csr_array((weight, (bins.bin, samples)), shape=(bins.count, count))
+    def by_bin(weight: Array) -> "scipy.sparse.csr_array":
+        return scipy.sparse.csr_array((weight, (bins.bin, samples)), shape=(bins.count, count))
 
     one, along = by_bin(np.ones(count)), by_bin(bins.place)
     sums = one.sum(axis=1), along.sum(axis=1), by_bin(bins.place**2).sum(axis=1)
@@ -362,7 +361,7 @@ def level_of_normal(bins: Bins, chance: float) -> float:
     spare = count - 1 - terms
     if spare < 1:
         return np.nan
-    explained = terms * float(f.isf(chance, terms, spare)) / spare
+    explained = terms * float(scipy.stats.f.isf(chance, terms, spare)) / spare
     return 1 - (count - 1) / spare / (1 + explained)
 
 
@@ -446,7 +445,7 @@ def dependence(missing: Mask, columns: Array, block: NDArray[np.int64] | None = 
                 spread = float(each.std(ddof=1)) * np.sqrt((1 - gone / count) / gone)
                 moved = abs(float(each[missing].mean()))
                 largest = max(largest, moved / spread if spread > 0 else 0.0)
-        chances.append(2 * columns.shape[1] * float(2 * norm.sf(largest)))
+        chances.append(2 * columns.shape[1] * float(2 * scipy.stats.norm.sf(largest)))
     if block is not None:
         chances.append(_clustered(np.bincount(block[missing], minlength=block[-1] + 1), block))
     return min(1.0, len(chances) * min(chances)) if chances else 1.0

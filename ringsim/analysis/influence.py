@@ -4,9 +4,9 @@ from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.special import expit, logit
 
 from ringsim.analysis import indices
 from ringsim.analysis.design import Drawn, Placement, drawn, endings, short_of_goal, strongest
@@ -331,7 +331,10 @@ def _separated(
         found = indices.areas(columns[rows], some)
         return np.where((found > 0) & (found < 1), found, np.nan)
 
-    return middle, np.stack(indices.replicate_interval(measure, replicate, logit, expit), axis=1)
+    return middle, np.stack(
+        indices.replicate_interval(measure, replicate, scipy.special.logit, scipy.special.expit),
+        axis=1,
+    )
 
 
 # Which V-joint is ahead of all others, and which is behind.

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from ringsim.analysis import indices
 from ringsim.analysis.indices import UNLIKELY
@@ -509,7 +509,7 @@ def what_separates(analysis: xr.Dataset) -> Table:
 def _separating(analysis: xr.Dataset) -> Iterator[tuple[str, list[int]]]:
     """The groups of samples with the inputs that separate them beyond chance, the best first."""
     samples = analysis.attrs["samples_run"]
-    normal = float(norm.isf(indices.chance_of_each(analysis.sizes["input"]) / 2))
+    normal = float(scipy.stats.norm.isf(indices.chance_of_each(analysis.sizes["input"]) / 2))
     for group in analysis["group"].values:
         one = analysis.sel(group=group)
         middle, ends = one["separation"].values, one["separation_interval"].values

@@ -1,16 +1,20 @@
 """Intervals of means, spreads, quantiles and shares."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import binom, binomtest, bootstrap, nbinom, norm, t
 
 from ringsim.outputs import COORDINATES, OUTPUTS
 from ringsim.outputs.family import Array
 from ringsim.variables import GOALS, Status, Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Intervals of means, spreads and quantiles of independent samples, and of replicates of designs.
 #
@@ -90,7 +94,7 @@ def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array,
         low, high = _of_spread(told)
         return np.where(alike, known, low), np.where(alike, known, high)
     batch = max(1, _BATCH // values.size)
-    found = bootstrap(
+    found = scipy.stats.bootstrap(
         (told,), statistic, n_resamples=RESAMPLES, batch=batch, axis=-1, vectorized=True,
         confidence_level=LEVEL, method="BCa", rng=np.random.default_rng(0),
     ).confidence_interval  # fmt: skip
@@ -124,7 +128,7 @@ def _of_spread(values: Array) -> tuple[Array, Array]:
     ranked = np.sort(np.concatenate(far, axis=-1), axis=-1)
     place = round((1 - LEVEL) / 2 * (RESAMPLES + 1))  # the 50th of 1,999, and as far from above
     error = _log_error(np.ones_like(known), np.mean(powers[3], axis=-1), count)
-    normal = float(norm.ppf(0.5 + LEVEL / 2))
+    normal = float(scipy.stats.norm.ppf(0.5 + LEVEL / 2))
     cut = int(count / (2 * np.sqrt(count - 4)))
     middle = np.sort(scaled, axis=-1)[..., cut : count - cut].mean(axis=-1, keepdims=True)
     fourth = count * ((scaled - middle) ** 4).sum(axis=-1) / (count - 1) ** 2
@@ -150,7 +154,7 @@ def _log_error(deviation: Array, fourth: Array, count: int) -> Array:
 def _limit(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
     """The normal limit; of the spread's logarithm, whose variance the fourth moment gives."""
     count, deviation = values.shape[-1], spread(values)
-    wide = t.ppf(0.5 + LEVEL / 2, count - 1)
+    wide = scipy.stats.t.ppf(0.5 + LEVEL / 2, count - 1)
     if statistic is np.mean:
         half, mean = wide * deviation / np.sqrt(count), values.mean(axis=-1)
         return mean - half, mean + half
@@ -168,9 +172,11 @@ def ranks(count: int, probability: float) -> tuple[int, int] | None:
     >>> ranks(100, 0.5), ranks(58, 0.05), ranks(59, 0.05)
     ((40, 60), None, (1, 10))
     """
-    most = int(binom.ppf(1.0 - 1e-6, count, probability)) + 1
-    least = max(1, int(binom.ppf(1e-6, count, probability)))
-    below = np.asarray(binom.cdf(np.arange(least - 1, min(most, count)), count, probability))
+    most = int(scipy.stats.binom.ppf(1.0 - 1e-6, count, probability)) + 1
+    least = max(1, int(scipy.stats.binom.ppf(1e-6, count, probability)))
+    below = np.asarray(
+        scipy.stats.binom.cdf(np.arange(least - 1, min(most, count)), count, probability)
+    )
     # below[k] is the probability that rank least + k lies above the quantile.
     best: tuple[float, ...] | None = None
     for low in range(len(below)):
@@ -231,7 +237,7 @@ def jackknife_error(left_out: Array) -> Array:
 
 def student(replicates: int) -> float:
     """Half length of an interval over the standard error from so many replicates."""
-    return float(t.ppf(0.5 + LEVEL / 2, replicates - 1)) if replicates > 1 else np.nan
+    return float(scipy.stats.t.ppf(0.5 + LEVEL / 2, replicates - 1)) if replicates > 1 else np.nan
 
 
 def quantile_of_replicates(
@@ -282,7 +288,9 @@ def of_difference(
         return apart + np.nan, apart + np.nan
     both = one**2 + other**2
     each = one**4 / free + other**4 / more
-    half = np.sqrt(both) * t.ppf(0.5 + LEVEL / 2, both**2 / np.where(each > 0, each, 1.0))
+    half = np.sqrt(both) * scipy.stats.t.ppf(
+        0.5 + LEVEL / 2, both**2 / np.where(each > 0, each, 1.0)
+    )
     half = np.where(each > 0, half, 0.0)  # no scatter at all leaves no doubt
     return apart - half, apart + half
 
@@ -292,14 +300,22 @@ def of_difference(
 
 def share_interval(count: int, samples: int) -> Interval:
     """Two-sided exact interval of a share.  Source: Clopper and Pearson, Biometrika 26 (1934)."""
-    low, high = binomtest(count, samples).proportion_ci(LEVEL, method="exact")
+    low, high = scipy.stats.binomtest(count, samples).proportion_ci(LEVEL, method="exact")
     return float(low), float(high)
 
 
 def share_bounds(count: int, samples: int, confidence: float) -> Interval:
     """The lower and the upper one-sided bound of a share, each with the confidence by itself."""
-    low = binomtest(count, samples, alternative="greater").proportion_ci(confidence, "exact").low
-    high = binomtest(count, samples, alternative="less").proportion_ci(confidence, "exact").high
+    low = (
+        scipy.stats.binomtest(count, samples, alternative="greater")
+        .proportion_ci(confidence, "exact")
+        .low
+    )
+    high = (
+        scipy.stats.binomtest(count, samples, alternative="less")
+        .proportion_ci(confidence, "exact")
+        .high
+    )
     return float(low), float(high)
 
 
@@ -312,13 +328,13 @@ def samples_needed(violations: int, probability: float, confidence: float) -> in
     >>> samples_needed(0, 0.99, 0.9), samples_needed(0, 0.99865, 0.9)
     (230, 1705)
     """
-    others = nbinom.isf(1.0 - confidence, violations + 1, 1.0 - probability)
+    others = scipy.stats.nbinom.isf(1.0 - confidence, violations + 1, 1.0 - probability)
     return violations + 1 + int(others)
 
 
 def _score(count: int, samples: int) -> Interval:
     """The two-sided score interval of a share.  Source: Wilson, J. Am. Stat. Ass. 22 (1927)."""
-    low, high = binomtest(count, samples).proportion_ci(LEVEL, method="wilson")
+    low, high = scipy.stats.binomtest(count, samples).proportion_ci(LEVEL, method="wilson")
     return float(low), float(high)
 
 

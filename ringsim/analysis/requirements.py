@@ -1,13 +1,14 @@
 """Requirements of a campaign: which values an antenna must keep to, how probably, how surely."""
 
+from __future__ import annotations
+
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
 from ringsim.analysis.intervals import Mask, good, numbers, quantities, tells_of
@@ -18,6 +19,9 @@ from ringsim.stepping.instant import Array
 from ringsim.tables import unit_text, with_unit
 from ringsim.units import Model
 from ringsim.variables import Fate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 OUTCOME = "outcome"
 _WORDS = [fate.word for fate in Fate if fate != Fate.NONE]

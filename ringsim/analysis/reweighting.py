@@ -5,11 +5,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
 from pydantic import ValidationError
-from scipy.optimize import brentq
-from scipy.stats import beta, t
 
 from ringsim.analysis.design import (
     LOST,
@@ -93,7 +92,7 @@ def mean_interval(values: Array, weights: Array, replicate: Replicate) -> Interv
     free = effective(weights) - 1
     if free < 1:
         return NONE
-    half = float(t.ppf(0.5 + LEVEL / 2, free)) * _error(values, weights, centre)
+    half = float(scipy.stats.t.ppf(0.5 + LEVEL / 2, free)) * _error(values, weights, centre)
     return centre - half, centre + half
 
 
@@ -122,11 +121,11 @@ def share_interval(own: Mask, weights: Array, replicate: Replicate) -> Interval:
         error = _error(own.astype(float), weights, share)
         count = share * (1 - share) / error**2
         # Fewer degrees of freedom than the count tells: t instead of the normal distribution.
-        wide = t.ppf(0.5 + LEVEL / 2, [len(own) - 1, max(effective(weights) - 1, 1)])
+        wide = scipy.stats.t.ppf(0.5 + LEVEL / 2, [len(own) - 1, max(effective(weights) - 1, 1)])
         count *= float(wide[0] / wide[1]) ** 2
     hits, tail = share * count, (1 - LEVEL) / 2
-    low = beta.ppf(tail, hits, count - hits + 1) if share > 0 else 0.0
-    high = beta.ppf(1 - tail, hits + 1, count - hits) if share < 1 else 1.0
+    low = scipy.stats.beta.ppf(tail, hits, count - hits + 1) if share > 0 else 0.0
+    high = scipy.stats.beta.ppf(1 - tail, hits + 1, count - hits) if share < 1 else 1.0
     return float(low), float(high)
 
 
@@ -214,9 +213,17 @@ def mean_bounds(mean: float, count: int, error: float) -> Interval:
         return float(one + other - far)
 
     tiny = 1e-300
-    low = brentq(apart, tiny, mean, rtol=1e-10) if mean > tiny and apart(tiny) > 0 else 0.0
+    low = (
+        scipy.optimize.brentq(apart, tiny, mean, rtol=1e-10)
+        if mean > tiny and apart(tiny) > 0
+        else 0.0
+    )
     most = 1.0 - 2.0**-53
-    high = brentq(apart, mean, most, rtol=1e-10) if mean < most and apart(most) > 0 else 1.0
+    high = (
+        scipy.optimize.brentq(apart, mean, most, rtol=1e-10)
+        if mean < most and apart(most) > 0
+        else 1.0
+    )
     return float(low), float(high)
 
 
@@ -261,7 +268,7 @@ class Cap:
         low, high = mean_bounds(mean, len(values), error)
         if replicate is not None:
             scatter, free = standard_error(values, replicate)
-            half = float(t.isf(error, free) * scatter) if free > 0 else np.nan
+            half = float(scipy.stats.t.isf(error, free) * scatter) if free > 0 else np.nan
             low, high = np.fmin(low, mean - half), np.fmax(high, mean + half)
         return max(0.0, self.weight * low), min(1.0, self.weight * high + self.beyond)
 

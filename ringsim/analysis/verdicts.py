@@ -1,16 +1,17 @@
 """Requirements of a campaign and what its samples say of them, at one look or several."""
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Iterator, Mapping
 from itertools import takewhile
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.stats import t
 
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import (
@@ -31,6 +32,9 @@ from ringsim.refusal import known_or_nearest
 from ringsim.tables import counted, number_text, with_unit
 from ringsim.units import Model
 from ringsim.variables import GOALS, Code, Fate, about, flags_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # When a campaign may stop: the conditions, the looks at them, and how looks share an error.
 #
@@ -56,7 +60,7 @@ class Condition(Model):
     """Half the length of the interval, at most, in the output's unit."""
 
     @model_validator(mode="after")
-    def _one_of_two(self) -> "Condition":
+    def _one_of_two(self) -> Condition:
         if (self.requirement is None) == (self.of is None):
             raise ValueError(
                 "needs either requirement, as { requirement = NAME }, or of, as { of = NAME, "
@@ -197,7 +201,7 @@ def bounds(
         share = float(kept.mean())
         error, free = standard_error(kept.astype(float), replicate)
         if free > 0:
-            below, above = (float(t.ppf(level, free) * error) for level in levels)
+            below, above = (float(scipy.stats.t.ppf(level, free) * error) for level in levels)
             low, high = max(0.0, min(low, share - below)), min(1.0, max(high, share + above))
     return low, high
 
@@ -210,6 +214,8 @@ def judge(
     Where the campaign's rule for stopping looks at a requirement again and again, its bounds hold
     at all looks at once.
     """
+    import xarray as xr  # here: see ringsim.analysis.design
+
     rule = rule_of(campaign.attrs)
     columns: dict[str, list[float]] = {name: [] for name in _MEANING}
     for name, wanted in requirements.items():

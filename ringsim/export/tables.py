@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 import xarray as xr
-from scipy.io import savemat
 
 from ringsim.files import whole
 from ringsim.refusal import InputError
@@ -194,7 +194,7 @@ def write_mat(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
             about["codes"][name] = ", ".join(f"{code:g} {word}" for code, word in named)
     attributes = {str(name)[:LONGEST_NAME]: value for name, value in dataset.attrs.items()}
     with whole(path, lasting=False) as draft, draft.open("wb") as file:
-        savemat(
+        scipy.io.savemat(
             file, content | about | {"attributes": attributes}, do_compression=True,
             long_field_names=True, oned_as="column",
         )  # fmt: skip

@@ -7,9 +7,9 @@ from typing import Any
 import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
+import scipy
 from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from ringsim.core.turning import Turning
 from ringsim.hermite import extrapolated
@@ -31,12 +31,14 @@ Indices = NDArray[np.int64]
 
 def axes_of(turns: Array) -> Array:
     """Rotation matrices, shape (n, 3, 3), of quaternions, shape (n, 4), brought to unit length."""
-    return np.asarray(Rotation.from_quat(turns[:, [1, 2, 3, 0]]).as_matrix())
+    return np.asarray(
+        scipy.spatial.transform.Rotation.from_quat(turns[:, [1, 2, 3, 0]]).as_matrix()
+    )
 
 
 def turn_of(axes: Array) -> Array:
     """Unit quaternion, shape (4,), of a rotation matrix, shape (3, 3)."""
-    return np.roll(Rotation.from_matrix(axes).as_quat(), 1)
+    return np.roll(scipy.spatial.transform.Rotation.from_matrix(axes).as_quat(), 1)
 
 
 def gyration(turns: Array) -> Array:

@@ -6,10 +6,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csc_array, eye_array
-from scipy.sparse.linalg import splu
-from scipy.spatial.transform import Rotation
 
 from ringsim.layout.bodies import (
     STEP,
@@ -231,24 +229,34 @@ class Frames:
             "drawing (reduce rods.length_error, structure.hinge_error or structure.angle_error)"
         )
 
-    def _step(self, stiffness: csc_array, rows: csc_array, pushed: Array, gaps: Array) -> Array:
+    def _step(
+        self,
+        stiffness: "scipy.sparse.csc_array",
+        rows: "scipy.sparse.csc_array",
+        pushed: Array,
+        gaps: Array,
+    ) -> Array:
         """Move by Newton's step; returns Lagrange's multipliers over the scale."""
         scale, n = self._scale, self._size
-        held = stiffness + _WEAK * scale * eye_array(n)
-        both = coo_array(scale * rows)
-        top = coo_array(held)
+        held = stiffness + _WEAK * scale * scipy.sparse.eye_array(n)
+        both = scipy.sparse.coo_array(scale * rows)
+        top = scipy.sparse.coo_array(held)
         row = np.concatenate([top.row, both.row + n, both.col])
         column = np.concatenate([top.col, both.col, both.row + n])
         values = np.concatenate([top.data, both.data, both.data])
         size = n + len(gaps)
-        matrix = csc_array(coo_array((values, (row, column)), shape=(size, size)))
-        found = splu(matrix).solve(-np.concatenate([pushed, scale * gaps]))
+        matrix = scipy.sparse.csc_array(
+            scipy.sparse.coo_array((values, (row, column)), shape=(size, size))
+        )
+        found = scipy.sparse.linalg.splu(matrix).solve(-np.concatenate([pushed, scale * gaps]))
         move = found[:n].reshape(-1, 6)
         self._place[:-1] += move[:, :3]
-        self._axes[:-1] = Rotation.from_rotvec(move[:, 3:]).as_matrix() @ self._axes[:-1]
+        self._axes[:-1] = (
+            scipy.spatial.transform.Rotation.from_rotvec(move[:, 3:]).as_matrix() @ self._axes[:-1]
+        )
         return np.asarray(found[n:])
 
-    def _closing(self) -> tuple[Array, csc_array]:
+    def _closing(self) -> tuple[Array, "scipy.sparse.csc_array"]:
         """Gaps of all joints and what the mean angle is off, (c,), with derivatives."""
         gaps, rows, columns, slopes = [], [], [], []
         count = 0
@@ -270,7 +278,7 @@ class Frames:
         slopes.append((self._held[:, :, None] * by_turn).ravel())
         entries = np.concatenate(slopes), (np.concatenate(rows), np.concatenate(columns))
         size = count + len(self._held), self._size + 6
-        matrix = csc_array(coo_array(entries, shape=size))
+        matrix = scipy.sparse.csc_array(scipy.sparse.coo_array(entries, shape=size))
         return np.concatenate(gaps), matrix[:, : self._size]
 
     def _angles(self) -> tuple[Array, Array]:
@@ -337,11 +345,11 @@ class Frames:
         """Unknowns of pairs of frames, shape (n, 12)."""
         return (6 * pairs[:, :, None] + np.arange(6)).reshape(len(pairs), 12)
 
-    def _summed(self, blocks: Array, spots: Array) -> csc_array:
+    def _summed(self, blocks: Array, spots: Array) -> "scipy.sparse.csc_array":
         row = np.broadcast_to(spots[:, :, None], blocks.shape).ravel()
         column = np.broadcast_to(spots[:, None, :], blocks.shape).ravel()
-        whole = coo_array((blocks.ravel(), (row, column)), shape=(self._size + 6,) * 2)
-        return csc_array(whole)[: self._size, : self._size]
+        whole = scipy.sparse.coo_array((blocks.ravel(), (row, column)), shape=(self._size + 6,) * 2)
+        return scipy.sparse.csc_array(whole)[: self._size, : self._size]
 
     def _moved(self) -> Layout:
         """The layout with its parts where the frames are."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.special import ndtr, ndtri
 
 from ringsim.cable.records import CABLES
 from ringsim.refusal import InputError, known_or_nearest
@@ -215,7 +215,9 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
             "definite): bring them nearer to 0"
         ) from None
     dependent = points.copy()
-    dependent[:, moved] = inside(ndtr(ndtri(points[:, moved]) @ lower.T))
+    dependent[:, moved] = inside(
+        scipy.special.ndtr(scipy.special.ndtri(points[:, moved]) @ lower.T)
+    )
     return dependent
 
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.special import ndtr, ndtri
 
 from ringsim.choice import OneOf
 from ringsim.overrides import section_of
@@ -238,7 +238,7 @@ class Normal(Continuous):
 
     def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution."""
-        return np.asarray(self.mean + self.standard_deviation * ndtri(probability))
+        return np.asarray(self.mean + self.standard_deviation * scipy.special.ndtri(probability))
 
     def log_density(self, values: Values) -> Array:
         """Logarithm of the density above."""
@@ -249,7 +249,7 @@ class Normal(Continuous):
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
-        return float(ndtr((value - self.mean) / self.standard_deviation))
+        return float(scipy.special.ndtr((value - self.mean) / self.standard_deviation))
 
 
 class Lognormal(Continuous):

@@ -3,8 +3,8 @@
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+import scipy
 from pydantic import Field, PrivateAttr, model_validator
-from scipy.special import ndtr
 
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
@@ -130,4 +130,4 @@ class SubsetSimulation(Design):
             normal[batch] = anew * np.random.default_rng(stream).standard_normal(shape)
             if parents[0] >= 0:
                 normal[batch] += np.sqrt(1.0 - anew**2) * normal[parents]
-        return inside(ndtr(normal))
+        return inside(scipy.special.ndtr(normal))
