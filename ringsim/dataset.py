@@ -10,10 +10,9 @@ import numpy as np
 import xarray as xr
 
 from ringsim import build
-from ringsim.files import require_place, whole, writing
+from ringsim.files import require_file, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, axes, holds, span_names
-from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stored_state import layout_fingerprint
 from ringsim.variables import Fidelity, Outcome, Variable, flags_of
@@ -80,16 +79,6 @@ def _add_states(
     attributes = {"long_name": "time of a stored state", "units": "s"}
     times = xr.DataArray(found["state_time"], dims="state_time", attrs=attributes)
     coordinates["state_time"] = times
-
-
-def require_file(path: Path) -> None:
-    """Refuse (InputError) a name or a place at which no netCDF file can be written."""
-    require_place(path)
-    if path.suffix != ".nc":
-        raise InputError(
-            f"{path}: the file is netCDF and its name must end with .nc: write {path.stem}.nc "
-            '(one variable as a table: dataset["opening_angle"].to_series().to_csv(...))'
-        )
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:

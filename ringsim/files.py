@@ -99,6 +99,16 @@ def require_place(path: Path) -> None:
         raise InputError(f"{path}: cannot be written to this folder: choose another one")
 
 
+def require_file(path: Path) -> None:
+    """Refuse (InputError) a name or a place at which no netCDF file can be written."""
+    require_place(path)
+    if path.suffix != ".nc":
+        raise InputError(
+            f"{path}: the file is netCDF and its name must end with .nc: write {path.stem}.nc "
+            '(one variable as a table: dataset["opening_angle"].to_series().to_csv(...))'
+        )
+
+
 @contextlib.contextmanager
 def writing(path: Path, cure: str = "make room or choose another folder") -> Iterator[None]:
     """Refuse, with the cure, every OSError while a file is written, and the RuntimeError by which

@@ -209,6 +209,7 @@ REACHED = tuple(fate.words for fate in GOALS)
 def endings(campaign: xr.Dataset) -> NDArray[np.str_]:
     """What became of each sample in words: an outcome, or why its numbers do not hold; (sample,).
 
+    >>> import xarray as xr
     >>> codes = {"status": ("sample", [0, 0, 7, -1]), "outcome": ("sample", [1, 3, 0, -1])}
     >>> endings(xr.Dataset(codes)).tolist()
     ['deployed', 'stalled', 'lost: memory', 'not run']

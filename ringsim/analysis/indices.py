@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from ringsim.stepping.instant import Array
 # Rank measures of dependence between columns and an output, with intervals.
 
 
-_WIDE = float(scipy.stats.norm.ppf(0.5 + LEVEL / 2))
+_WIDE = NormalDist().inv_cdf(0.5 + LEVEL / 2)
 _SPARE = 5
 """Samples beyond the number of inputs, at least, that a partial correlation takes."""
 _HALVINGS = 60

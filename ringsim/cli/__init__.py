@@ -32,9 +32,9 @@ VERBS = {
 """Verb and its line of help; its command is ``VERB_command`` in the file of ``_FILES``."""
 _FILES = {
     "scene": ("scenes", "check", "explain"),
-    "run": ("run", "replay"),
+    "run": ("run",),
     "studies": ("accuracy", "stability"),
-    "campaign": ("campaign", "status"),
+    "campaign": ("campaign", "status", "replay"),
     "results": ("merge", "analyse", "report", "plot", "compare", "export"),
 }
 """Files of ``ringsim.cli`` and their verbs: only that of the verb which is called is imported."""

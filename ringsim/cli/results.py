@@ -24,9 +24,9 @@ from ringsim.cli.options import (
     require_with,
     write_animation,
 )
-from ringsim.dataset import require_file, save
+from ringsim.dataset import save
 from ringsim.exit_codes import EXIT_DONE, EXIT_NOT_MET
-from ringsim.files import require_place, writing
+from ringsim.files import require_file, require_place, writing
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
 from ringsim.tables import counted

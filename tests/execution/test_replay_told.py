@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ringsim.cli.run import judged
+from ringsim.cli.campaign import judged
 
 pytestmark = pytest.mark.quick
 
