@@ -342,14 +342,18 @@ def law_text(says: Mapping[str, Any]) -> str:
 
     >>> law_text({"kind": "uniform", "each_section": False, "low": 0.7, "high": 1.0})
     'uniform, low 0.7, high 1'
+    >>> law_text({"kind": "truncated", "high": 5.0, "of": {"kind": "exponential", "mean": 2.0}})
+    'truncated, high 5, of (exponential, mean 2)'
     """
     own = {key: value for key, value in says.items() if key not in ("shared", "each_section")}
     kind = str(own.pop("kind", own.pop("text", "")))
-    parts = (
-        f"{key.replace('_', ' ')} "
-        f"{number_text(value, 5) if isinstance(value, float) else show(value)}"
-        for key, value in own.items()
-    )
+
+    def told(value: Any) -> str:
+        if isinstance(value, Mapping):
+            return f"({law_text(value)})"
+        return number_text(value, 5) if isinstance(value, float) else show(value)
+
+    parts = (f"{key.replace('_', ' ')} {told(value)}" for key, value in own.items())
     return ", ".join([kind, *parts])
 
 

@@ -46,6 +46,11 @@ class Difference:
         """Place of the sample with the largest difference."""
         return int(np.argmax(self.apart))
 
+    @property
+    def listed(self) -> bool:
+        """Whether tables tell of it: sizes that differ at all."""
+        return not is_moment(self.name) and bool(self.apart.any())
+
 
 def differences(campaign: xr.Dataset) -> list[Difference]:
     """All outputs of a merged campaign that was checked; none if no check ended well."""
@@ -100,7 +105,7 @@ def check_lines(campaign: xr.Dataset) -> list[str]:
             _or_dash(each.bars[each.worst]), _or_dash(each.standard_error),
         )
         for each in found
-        if not is_moment(each.name) and each.apart.any()
+        if each.listed
     ]  # fmt: skip
     if rows:
         head = (
@@ -145,8 +150,8 @@ def verdict(campaign: xr.Dataset, found: list[Difference]) -> list[str]:
     if beyond:
         lines = [f"the engines differ by more than their error bars in {', '.join(beyond)}"]
     elif stated:
-        barred = sum(bool(np.isfinite(each.bars).any()) for each in found)
-        of = f" in the {barred} of {len(found)} outputs that have some" * (barred < len(found))
+        told = [bool(np.isfinite(each.bars).any()) for each in found if each.listed]
+        of = f" in the {sum(told)} of {len(told)} outputs that have some" * (not all(told))
         lines = [f"the engines differ by no more than their error bars{of}"]
     return lines + too_far(campaign, found)
 

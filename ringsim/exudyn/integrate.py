@@ -21,7 +21,7 @@ from ringsim.exudyn.model import Openings, State, joint_groups
 from ringsim.layout.layout import Layout
 from ringsim.outputs.meters import Reading
 from ringsim.outputs.recorder import Recorder
-from ringsim.rigid.statics import residual_tolerance, rope_reach, scales_of
+from ringsim.rigid.statics import RopeReach, residual_tolerance, scales_of
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.run import Run
@@ -128,7 +128,7 @@ def newton_norm(built: Built) -> float:
     reached = rounded * math.sqrt(size)
     if scene.rods.damping > 0.0:
         reached *= STIFFENING
-    return max(residual_tolerance(scene, layout, reached), rounded * rope_reach(scene))
+    return max(residual_tolerance(scene, layout, reached), rounded * RopeReach(scene).at(0.0))
 
 
 # Integrating a built model with exudyn's generalised-alpha; ``ringsim.stepping`` decides on the

@@ -10,10 +10,10 @@ import numpy as np
 from ringsim.cable.chain import ChainState
 from ringsim.cable.faults import CableFault
 from ringsim.cable.ropes import Ropes
-from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter, Readings
+from ringsim.frame.rods import Strains, move, moved_between, straighten
 from ringsim.frame.state import State
 from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Array
@@ -29,9 +29,12 @@ from ringsim.stepping.instant import Instant, Memory, Strained
 from ringsim.stepping.run import Run
 from ringsim.variables import Outcome
 
-_EASY = 3
-"""Newton iterations up to which a step was easy: the motion is smooth, and a cubic foretells it
-better than a parabola; where ropes swing within a step it does worse."""
+_EASY, _PATIENCE = 3, 4
+"""Newton iterations up to which a step was easy, and steps after which, if they are not, the other
+polynomial is tried that may foretell the motion: a cubic where it is smooth, as at the speed of a
+flight, a parabola where ropes swing within a step."""
+_MOST = 25
+"""Iterations that count for a step that failed: as many as there are at most."""
 _SHORTEST = 1e-9
 """Step (s) below which Newton's failure ends a run, as of the full model."""
 
@@ -54,7 +57,7 @@ class NoBalanceError(Exception):
 class Integration(Run):
     """One run of a model."""
 
-    changing = ("_moves", "_easy", "_steps", "_strains")
+    changing = ("_moves", "_taken", "_cubic", "_tried", "_steps", "_strains")
     _model: FrameModel
 
     def __init__(self, model: FrameModel, watch: Watch | None = None) -> None:
@@ -65,7 +68,7 @@ class Integration(Run):
         self._now, self._next = model.start.copy(), model.start.copy()
         self._energy = EnergyMeter(model)
         self._moves: list[tuple[float, Array]] = []
-        self._easy = False
+        self._taken, self._cubic, self._tried = [0, 0], True, 0
         self._steps: list[tuple[float, Array]] = []
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._readings = Readings(model)
@@ -130,7 +133,10 @@ class Integration(Run):
         self._move(after, self._guess(step))
         self._strains = self._damped(step, after)
         self._newton(time, step, after)
-        return after, self._measure(time, after)
+        try:
+            return after, self._measure(time, after)
+        except ValueError as error:  # the winches have no answer
+            raise NoBalanceError(str(error)) from error
 
     def _damped(self, step: float, after: State) -> Strains:
         """How the rates of strains follow from strains: the backward differences of second order
@@ -149,9 +155,21 @@ class Integration(Run):
         found = self._model.balance(time, step, self._now, after, self._strains)
         self.history.newton_iterations += found.iterations
         self.history.jacobians += found.tangents
+        self._choose(_MOST if found.why else found.iterations)
         if found.why:
             raise NoBalanceError(found.why)
-        self._easy = found.iterations <= _EASY
+
+    def _choose(self, taken: int) -> None:
+        """Choose what foretells the next step: what has left Newton less to do, when it was tried
+        last; this one took so many iterations.
+        """
+        self._taken[self._cubic] = taken
+        self._tried += 1
+        better = self._taken[True] <= self._taken[False]
+        if better != self._cubic:
+            self._cubic, self._tried = better, 0
+        elif taken > _EASY and self._tried >= _PATIENCE:
+            self._cubic, self._tried = not better, 0
 
     def _move(self, state: State, by: Array) -> None:
         move(self._model.mesh, state.pose, by[: self._model.mesh.unknowns])
@@ -159,10 +177,10 @@ class Integration(Run):
             state.hub += by[-3:]
 
     def _guess(self, step: float) -> Array:
-        """Change of all unknowns over a step, from two steps or, where the last was easy, three."""
+        """Change of all unknowns over a step, from the last two steps or three."""
         if not self._moves:
             return 0.5 * step**2 * self._model.first
-        return extrapolated(self._moves[-3 if self._easy else -2 :], step)
+        return extrapolated(self._moves[-3 if self._cubic else -2 :], step)
 
     def _accept(self, step: float, after: State, found: Instant) -> None:
         """Go on from a state."""

@@ -11,9 +11,9 @@ from ringsim.core.library import ASKED, NOT_ASKED, call, empty_of
 from ringsim.core.turning import Seen
 from ringsim.frame.cables import Arms, FrameCables, Laws, Lines, Roped
 from ringsim.frame.elimination import Border, Fronts
-from ringsim.frame.kernels import Pose, Strains, add_forces, move, room_for_loads
 from ringsim.frame.laws import Acting, JointLaws, Openings
 from ringsim.frame.mesh import CURE, NOT_HERE, Mesh, Skeleton, mesh_of
+from ringsim.frame.rods import Pose, Strains, add_forces, move, room_for_loads
 from ringsim.frame.springs import STIFFNESS, BeamSlide, RigidSlide, Slide, Web
 from ringsim.frame.state import (
     Coefficients,
@@ -29,10 +29,10 @@ from ringsim.refusal import InputError
 from ringsim.rigid.assembling import assembled
 from ringsim.rigid.statics import (
     OneCoordinate,
+    RopeReach,
     coordinates,
     first_acceleration,
     residual_tolerance,
-    rope_reach,
 )
 from ringsim.scene import Scene
 
@@ -155,7 +155,7 @@ class FrameModel:
         self._loaded = loaded, pose.place[loaded], np.array(forces).reshape(-1, 3)
         self._tau = float(mesh.tau.max())
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
-        self._coordinates = coordinates(scene)
+        self._coordinates, self._ropes = coordinates(scene), RopeReach(scene)
         self._masses = mesh.point_mass.copy()
         np.add.at(self._masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
@@ -241,7 +241,7 @@ class FrameModel:
         slides = STIFFNESS * self._stiffest if self.slides else 0.0
         reached = 4.0 * sys.float_info.epsilon * (math.sqrt(self.size) * (inertia + rods) + slides)
         reached *= self._coordinates
-        ropes = rope_reach(self.scene, self.coefficients.rate_by_place(step))
+        ropes = self._ropes.at(self.coefficients.rate_by_place(step))
         return max(self._tolerance, reached, 4.0 * sys.float_info.epsilon * ropes)
 
     def balance(

@@ -7,9 +7,9 @@ from typing import Self
 import numpy as np
 
 from ringsim.cable.chain import ChainState, work_between
-from ringsim.frame.kernels import Strains, energies_of
 from ringsim.frame.mesh import Indices, Mesh
 from ringsim.frame.model import FrameModel
+from ringsim.frame.rods import Strains, energies_of
 from ringsim.frame.springs import passing_pairs
 from ringsim.frame.state import State
 from ringsim.layout.bodies import Array, OnBody, OnRod

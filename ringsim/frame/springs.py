@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.core.library import call
-from ringsim.frame.kernels import Pose
 from ringsim.frame.laws import Law, Tape, taped
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
+from ringsim.frame.rods import Pose
 from ringsim.frame.state import State
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.layout import Layout

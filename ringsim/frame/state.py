@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.cable.chain import ChainState
-from ringsim.frame.kernels import Pose
 from ringsim.frame.mesh import Indices, Mesh
+from ringsim.frame.rods import Pose
 from ringsim.layout.bodies import Array
 from ringsim.layout.layout import Hung
 from ringsim.parts.ground import Hold

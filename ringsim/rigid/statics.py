@@ -270,21 +270,26 @@ def residual_tolerance(scene: Scene, layout: Layout, reached: float) -> float:
     )
 
 
-def rope_reach(scene: Scene, rate_by_place: float = 0.0) -> float:
-    """Residual norm over the round-off of coordinates of order 1 m that ropes leave, N.
+class RopeReach:
+    """Residual norm over the round-off of coordinates of order 1 m that ropes leave.
 
     The strain S / M - 1 of a rope is rounded as S / M, about 1, and its tension pulls on both ends
-    of every span; damped ropes feel rates, rounded as much as their derivative after places (1/s).
+    of every span; damped ropes feel rates, rounded as much as their derivative after places.
     """
-    if scene.cables is None:
-        return 0.0
-    pulls = [
-        cable.axial_stiffness
-        * (1.0 + cable.damping_time * rate_by_place)
-        * math.sqrt(2 * (scene.pulleys_of(cable) + 1))
-        for _, cable in scene.cables.present()
-    ]
-    return math.hypot(*pulls)
+
+    def __init__(self, scene: Scene) -> None:
+        present = [] if scene.cables is None else scene.cables.present()
+        self._pulls = [
+            (
+                cable.axial_stiffness * math.sqrt(2 * (scene.pulleys_of(cable) + 1)),
+                cable.damping_time,
+            )
+            for _, cable in present
+        ]
+
+    def at(self, rate_by_place: float) -> float:
+        """That norm, N, where rates follow places so (1/s); 0 without ropes."""
+        return math.hypot(*(still * (1.0 + time * rate_by_place) for still, time in self._pulls))
 
 
 def _swing_step(inertia: float, stiffness: float, steps: int) -> float:

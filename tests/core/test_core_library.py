@@ -20,10 +20,10 @@ from ringsim.core.turning import Seen
 from ringsim.frame import elimination
 from ringsim.frame.cables import Arms, Laws, Lines, Roped
 from ringsim.frame.elimination import Border, Fronts
-from ringsim.frame.kernels import Pose, Strains
 from ringsim.frame.laws import Acting, Tape, play, taped
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.model import FrameModel, System
+from ringsim.frame.rods import Pose, Strains
 from ringsim.frame.springs import Web
 from ringsim.frame.state import Coefficients, Followed, Held, Moving
 from ringsim.scene import load_scene

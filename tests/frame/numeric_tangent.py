@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.core.library import call
-from ringsim.frame.kernels import Strains, move
 from ringsim.frame.model import FrameModel
+from ringsim.frame.rods import Strains, move
 from ringsim.frame.state import State
 from ringsim.scene import Scene
 

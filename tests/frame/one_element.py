@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from ringsim.core.library import call
 from ringsim.frame.elimination import Fronts
-from ringsim.frame.kernels import (
+from ringsim.frame.mesh import Mesh
+from ringsim.frame.rods import (
     Pose,
     Strains,
     add_forces,
     room_for_loads,
 )
-from ringsim.frame.mesh import Mesh
 
 Array = NDArray[np.float64]
 LENGTH = 0.3

@@ -103,7 +103,7 @@ typedef struct {
     I unknowns;
 } Mesh;
 
-/* ringsim.frame.kernels */
+/* ringsim.frame.rods */
 typedef struct {
     Reals place, axes, angle;
 } Pose;

@@ -1,6 +1,6 @@
 /* Elastic rods and masses, four elements at a time: forces, energies and tangent.
 
-   Formulas: ringsim/frame/kernels.py, and docs/theory/rods.md. */
+   Formulas: ringsim/frame/rods.py, and docs/theory/rods.md. */
 
 #include "core.h"
 
@@ -12,7 +12,7 @@ static const D SMALL = 0.1;
    m; c, e and c' / k; forces and moments on the ends and their arms in the frames. */
 typedef struct {
     Mat4 end[2], middle;
-    Vec4 d, psi, n, w, m, own, force[2], moment[2], arm[2];
+    Vec4 d, psi, n, w, m, bend, force[2], moment[2], arm[2];
 } Load;
 
 /* Numbers that so many elements keep. */
@@ -90,8 +90,8 @@ static Vec4 strained(Load *own, const Group *group, V length, D *now) {
     own->psi = rotation_vector4(&apart);
     Mat4 half = turned4(times4(all(0.5), own->psi));
     own->middle = mul4(&own->end[0], &half);
-    own->own = coefficients(own->psi);
-    Vec4 u = straightened(own->psi, own->own.x, turn_back4(&own->middle, own->d));
+    own->bend = coefficients(own->psi);
+    Vec4 u = straightened(own->psi, own->bend.x, turn_back4(&own->middle, own->d));
     u.x -= length;
     for (int k = 0; k < group->live; k++) {
         D *to = now + 6 * group->element[k];
@@ -103,11 +103,11 @@ static Vec4 strained(Load *own, const Group *group, V length, D *now) {
 
 /* n, w and m of the force and moment in the middle's axes. */
 static void carry(Load *own, Vec4 force, Vec4 moment) {
-    V c = own->own.x, e = own->own.y;
+    V c = own->bend.x, e = own->bend.y;
     Vec4 psi = own->psi, y = turn_back4(&own->middle, own->d);
     own->n = turn4(&own->middle, straightened(psi, c, force));
     own->w = cross4(own->d, own->n);
-    Vec4 bent = straightened(psi, c, plus4(moment, bowed(psi, own->own, y, force)));
+    Vec4 bent = straightened(psi, c, plus4(moment, bowed(psi, own->bend, y, force)));
     own->m = plus4(turn4(&own->middle, bent),
                    times4(e, cross4(own->w, turn4(&own->middle, psi))));
 }
@@ -214,7 +214,7 @@ typedef struct {
 } Blocks;
 
 static void blocks_of(const Load *own, const V stiffness[6], V mass, V other, Blocks *out) {
-    V c = own->own.x, e = own->own.y, zero = all(0.0), half = all(0.5);
+    V c = own->bend.x, e = own->bend.y, zero = all(0.0), half = all(0.5);
     Vec4 d = own->d, n = own->n, w = own->w, bend = turn4(&own->middle, own->psi);
     Mat4 halves = {{half, zero, zero, zero, half, zero, zero, zero, half}};
     Mat4 a = in_space4(&own->middle, stiffness[0], stiffness[1]);

@@ -1,9 +1,15 @@
-"""Broyden's corrections against the secant method and against a linear system's solution."""
+"""Newton's method in a step: Broyden's corrections against the secant method and a linear system's
+solution; iterations where motion is smooth; what stops it.
+"""
 
 import numpy as np
 import pytest
 
+from law_scenes import CABLES, of_cables
 from ringsim.core.library import call
+from ringsim.frame.integrate import Integration
+from ringsim.frame.model import FrameModel
+from ringsim.scene import load_scene
 
 pytestmark = pytest.mark.quick
 
@@ -76,3 +82,40 @@ def test_a_turn_counts_as_the_way_it_moves() -> None:
         found.append([secants.corrected(ways * change) / ways for change in changes])
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
     assert not np.allclose(found[0][2], changes[2])
+
+
+def test_a_flight_takes_few_iterations() -> None:
+    """Twenty minutes in steps of some seconds: the motion is smooth, and a cubic foretells it."""
+    winding = dict.fromkeys(
+        (f"cables.{plane}.winch.winding.speed" for plane in ("upper", "lower")), 0.0026
+    )
+    values = winding | {"solver.end_time": 1500.0, "solver.step": 5.0}
+    run = Integration(FrameModel(load_scene("ring18-cable").with_values(values))).run()
+    assert str(run.reason) == "all V-joints have reached 180 deg"
+    assert run.newton_iterations < 4 * (len(run.times) - 1)
+    assert len(run.times) < 700
+
+
+@pytest.mark.parametrize("error", [ValueError("no speed goes with it"), KeyboardInterrupt()])
+def test_what_python_raises_below_the_core_arrives(
+    error: BaseException, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A winch that answers is asked from within Newton's method: nothing is swallowed there."""
+    scene = of_cables(CABLES["motor"] | {"solver.end_time": 0.1})
+    run = Integration(FrameModel(scene))
+    own, asked = run._cables.answer, 0
+
+    def refuse(time: float) -> None:
+        nonlocal asked
+        asked += 1
+        if asked > 20:
+            raise error
+        own(time)
+
+    monkeypatch.setattr(run._cables, "answer", refuse)
+    if isinstance(error, KeyboardInterrupt):
+        with pytest.raises(KeyboardInterrupt):
+            run.run()
+    else:
+        assert "no speed goes with it" in str(run.run().reason)
+    assert asked > 20
