@@ -57,6 +57,24 @@ def test_pairs_show_what_scatter_hides():
     assert "not paired" in compared(found)[2]
 
 
+@pytest.mark.parametrize(("share", "worse"), [(5e-4, False), (5e-3, True)])
+def test_less_than_a_thousandth_is_worse_in_neither(share, worse):
+    """However sure the difference is: nobody would design otherwise for it."""
+    found = compare(seeded(VALUES), seeded(VALUES * (1.0 + share)))
+    low, _, high = difference(found)
+    assert 0.0 < low < high
+    row = next(line for line in compared(found) if line.startswith("asynchrony_max "))
+    assert ("  second  " in f"{row}  ") == worse, row
+
+
+def test_settings_of_the_solver_are_no_inputs_that_differ():
+    bars = np.arange(COUNT) % 2.0
+    first, second = seeded(VALUES), seeded(SHIFTED)
+    for path, told in (("solver.error_bars", False), ("loads.force", True)):
+        both = with_input(first, bars, path), with_input(second, 1.0 - bars, path)
+        assert ("inputs differ in" in compare(*both).attrs["pairing"]) == told
+
+
 def test_seeds_pair_samples_of_campaigns_of_other_lengths_also_with_other_inputs():
     force = np.linspace(0.01, 0.02, COUNT)
     one = with_input(seeded(VALUES), force)

@@ -139,6 +139,19 @@ def test_pulleys_matter_by_mean_and_by_place():
     assert any('cables.friction["section 3 V"]' in line for line in told(found, full=True))
 
 
+def test_what_is_left_out_is_counted_and_round_off_has_no_inputs():
+    """Five forces matter alike: three are listed, two counted.  An output of 1e-17 has none."""
+    random = np.random.default_rng(8)
+    forces = random.random((300, 5))
+    whole = forces.sum(axis=1) + 0.05 * random.normal(size=300)
+    made = campaign(whole, prestress_energy=1e-17 * whole)
+    made = with_inputs(made, **{f"loads__force{k}": forces[:, k] for k in range(5)})
+    lines = told(analyse(made))
+    further = [line for line in lines if line.startswith("further inputs beyond chance")]
+    assert further == ["further inputs beyond chance, told with --full: asynchrony_max 2"]
+    assert not any(line.split()[:1] == ["prestress_energy"] and "loads" in line for line in lines)
+
+
 def test_what_separates_failures_stalls_and_violations_is_found():
     random = np.random.default_rng(7)
     force, other = random.random((2, 200))

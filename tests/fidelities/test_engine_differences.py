@@ -77,6 +77,17 @@ def test_the_last_line_says_whether_bars_cover_the_differences() -> None:
     )
     near = check_lines(campaign(deployment_time_checked=[10.01, 11.02, NAN, NAN]))
     assert near[-1] == "the engines differ by no more than their error bars"
+    # Of what tables do not list it says nothing: moments, and numbers that are the same.
+    none = [0.0] * 4
+    two = campaign(
+        deployment_time_checked=[10.01, 11.02, NAN, NAN],
+        peak_tension=[5.0] * 4, peak_tension_checked=[5.1, 5.0, NAN, NAN],
+        peak_tension_time=[1.0] * 4, peak_tension_time_checked=[1.5, 1.0, NAN, NAN],
+        asynchrony_max=none, asynchrony_max_checked=none,
+    )  # fmt: skip
+    assert check_lines(two)[-1] == (
+        "the engines differ by no more than their error bars in the 1 of 2 outputs that have some"
+    )
     silent = campaign().drop_vars(["deployment_time_error", "deployment_time_error_checked"])
     assert "error bars in" not in check_lines(silent)[-1]
 

@@ -139,6 +139,11 @@ IMPOSSIBLE = [
            "spacecraft.inertia[3] = 2.1 kg m^2", "at most the sum of the others, 2"),
     _scene("gravity on a free base", "gravity.vector = [0.0, 0.0, -9.81]",
            "gravity.vector = [0.0, 0.0, -9.81] m/s^2", "would fall", 'boom.base = "fixed"'),
+    _scene("gravity beside a spacecraft",
+           "gravity.vector = [0.0, 0.0, -9.81]\n"
+           "[spacecraft]\nmass = 9.0\ninertia = [1.0, 1.0, 1.0]\n[boom]\nkind = 'rigid'",
+           "gravity.vector", "with a spacecraft: the structure would fall",
+           "leave [spacecraft] out and hold it"),
     _scene("spacecraft on lines",
            "gravity.vector = [0.0, 0.0, -9.81]\n[offload]\n"
            "[spacecraft]\nmass = 9.0\ninertia = [1.0, 1.0, 1.0]\n[boom]\nkind = 'rigid'",
