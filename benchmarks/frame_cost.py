@@ -142,50 +142,39 @@ def growth(counts: list[int]) -> None:
 
 
 def profile(name: str) -> None:
-    """Compiled kernels one by one, and the rest; counts and processor time."""
-    import ringsim.frame.cables as cables
-    import ringsim.frame.elimination as factored
-    import ringsim.frame.integrate as integrate
-    import ringsim.frame.laws as laws
-    import ringsim.frame.model as model
-    import ringsim.frame.readings as meter
-    import ringsim.frame.springs as net
+    """Functions of the core one by one, and the rest; counts and processor time."""
+    from ringsim.core import library
+    from ringsim.frame import integrate
 
     scene = scene_of(name)
     integrate.solve(scene.with_values({"solver.end_time": 0.5, "record.interval": 0.1}))
     spent: Counter[str] = Counter()
     calls: Counter[str] = Counter()
-    rooms = {
-        model: ("balance", "differentiate"),
-        factored: ("factor", "solve", "solve_one", "dgetrf", "dgetrs"),
-        cables: ("pull_cables", "add_cables", "pull_tight", "of_ropes", "factors_needed"),
-        net: ("stretched",),
-        laws: ("passing_joints",),
-        integrate: ("move", "moved_between", "straighten"),
-        meter: ("energies_of",),
-    }
-    for room, names in rooms.items():
-        for kernel in names:
-            own = getattr(room, kernel)
+    found = library._function
 
-            def timed(*given: Any, own: Any = own, key: str = kernel, **more: Any) -> Any:
-                begun = time.process_time()
-                try:
-                    return own(*given, **more)
-                finally:
-                    spent[key] += time.process_time() - begun
-                    calls[key] += 1
+    def timed(kernel: str) -> tuple[str, Any]:
+        takes, own = found(kernel)
 
-            setattr(room, kernel, timed)
+        def run(*words: Any) -> Any:
+            begun = time.process_time()
+            try:
+                return own(*words)
+            finally:
+                spent[kernel] += time.process_time() - begun
+                calls[kernel] += 1
+
+        return takes, run
+
+    library._function = timed
     begun = time.process_time()
     integrate.solve(scene)
     taken = time.process_time() - begun
-    print("| kernel | calls | a call, ms | share |\n|---|---|---|---|")
+    print("| function | calls | a call, ms | share |\n|---|---|---|---|")
     for kernel, each in spent.most_common():
         own = 1e3 * each / calls[kernel]
         print(f"| {kernel} | {calls[kernel]} | {own:.3f} | {each / taken:.1%} |")
     rest = taken - sum(spent.values())
-    what = "all else: calls, energies, step control, records"
+    what = "all else: Python"
     print(f"| {what} |  |  | {rest / taken:.1%} |")
     print(f"\n{taken:.2f} s in all")
 

@@ -87,7 +87,7 @@ def skew(vectors: Array) -> Array:
 # exudyn's damper gives the torque d w + m at a rate w.  Before every residual its d and m are set
 # so that this line goes through the law at Newton's iterate: the residual is the law's, and d is
 # the slope that Newton's tangent has.  So the slope may be the secant to the other side of zero
-# rate where a joint turns round within a step (``ringsim.stepping.locks``), which no user function
+# rate where a joint turns round within a step (``ringsim.core.turning``), which no user function
 # of exudyn's allows: it differentiates those by itself.
 
 

@@ -99,7 +99,7 @@ class JacobianPattern:
         """All entries as (row, column, value), shape (entries, 3), until the next call.
 
         ``by_q`` and ``by_rate`` multiply the derivatives after coordinates and after rates;
-        ``slopes`` are those of the pulleys' friction (``ringsim.stepping.locks``), and ``left``
+        ``slopes`` are those of the pulleys' friction (``ringsim.core.turning``), and ``left``
         is the share of each rope's stiffness that its winches do not answer.
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
