@@ -276,6 +276,7 @@ class FrameCables:
         if time != self._turned_at and not self.winches.answering:
             self._wind(*self.winches.at(time, self.ropes, None, None))
             self._turned_at = time
+            self.roped.left[:] = 1.0
 
     def answer(self, time: float) -> None:
         """Let winches turn that answer to their ropes, whose spans are measured."""
