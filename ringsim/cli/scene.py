@@ -281,8 +281,8 @@ def margin_lines(scene: Scene) -> Iterator[str]:
         yield f"{name}: margin = {_formula(drive, kinds)}"
     if "pulley friction" in kinds:
         yield (
-            "with the pulleys' friction (and a motor's gear) times its factor tensions are found "
-            "anew: margins do not follow from the forces without factors alone"
+            "each margin has tensions of its own, found with the friction of pulleys and gears "
+            "times the standard's factor: it is not the forces above times these factors"
         )
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
