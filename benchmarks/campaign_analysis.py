@@ -28,7 +28,7 @@ from ringsim.outputs.family import COORDINATES
 from ringsim.scene import load_scene
 from ringsim.storage.netcdf import PER_SAMPLE, add_coordinate, add_variable
 from ringsim.tables import text_table
-from ringsim.variables import PLANES, Fate, Status
+from ringsim.variables import PLANES, Cause, Fate, Status
 
 SECTIONS, SPANS, PULLEYS, BLOCK = 18, 37, 36, 500
 TEXT = """
@@ -109,6 +109,7 @@ def block(random, count, times, scalars):
         "deployment_time": deployed, "final_time": ends,
         "lock_time": ends[:, None, None] - random.random((count, 2, SECTIONS)),
         "status": np.where(lost, Status.TIMEOUT, Status.OK),
+        "cause": np.where(lost, Cause.TIME_LIMIT, Cause.NONE),
         "outcome": np.where(lost, Fate.NONE, np.where(stalled, Fate.STALLED, Fate.DEPLOYED)),
         "reason": np.where(lost, "took too long", "all V-joints have locked").astype(object),
         "rods_young_modulus": modulus, "cables_upper_friction_coefficient": upper,

@@ -26,9 +26,11 @@ class Figures(dict[str, "Figure"]):
         return f'figures: {", ".join(self)}: figures["NAME"].savefig("NAME.png")'
 
     def _repr_html_(self) -> str:
-        from ringsim.plots.style import inline
+        from ringsim.plots.style import Inline
 
-        drawn = (f"<p>{name}</p>{inline(figure, name, name)}" for name, figure in self.items())
+        drawn = (
+            f"<p>{name}</p>{Inline(figure, name, name).element()}" for name, figure in self.items()
+        )
         return f'<div style="background: white">{"".join(drawn)}</div>'
 
 

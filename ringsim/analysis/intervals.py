@@ -412,7 +412,7 @@ def numbers(campaign: xr.Dataset, name: str) -> Array:
     """A variable over samples as floats, NaN where it is missing, or the variable itself is."""
     if name not in campaign:
         return np.full(campaign.sizes["sample"], np.nan)
-    values = campaign[name].to_numpy().astype(float)
+    values = campaign.variables[name].to_numpy().astype(float)
     known = quantities().get(name.removesuffix(CHECKED))
     # Missing counts are negative.
     counts = known is not None and known.dtype.startswith("i")
@@ -421,7 +421,7 @@ def numbers(campaign: xr.Dataset, name: str) -> Array:
 
 def good(campaign: xr.Dataset) -> Mask:
     """Which samples have numbers that hold."""
-    return np.asarray(campaign["status"].to_numpy() == Status.OK)
+    return np.asarray(campaign.variables["status"].to_numpy() == Status.OK)
 
 
 def tells_of(campaign: xr.Dataset, name: str) -> Mask:
@@ -430,18 +430,18 @@ def tells_of(campaign: xr.Dataset, name: str) -> Mask:
     """
     done = np.zeros(campaign.sizes["sample"], dtype=bool)
     if "outcome" in campaign:
-        done = np.isin(campaign["outcome"].to_numpy(), GOALS)
+        done = np.isin(campaign.variables["outcome"].to_numpy(), GOALS)
     return np.asarray(good(campaign) & ~(done & np.isnan(numbers(campaign, name))))
 
 
 def lost(campaign: xr.Dataset) -> Mask:
     """Which samples have run and given no numbers that hold."""
-    return np.asarray(campaign["status"].to_numpy() >= Status.SOLVER_FAILED)
+    return np.asarray(campaign.variables["status"].to_numpy() >= Status.SOLVER_FAILED)
 
 
 def ran(campaign: xr.Dataset) -> Mask:
     """Which samples have run; the others are neither lost nor without a value."""
-    return np.asarray(campaign["status"].to_numpy() >= Status.OK)
+    return np.asarray(campaign.variables["status"].to_numpy() >= Status.OK)
 
 
 def used(campaign: xr.Dataset) -> xr.Dataset:

@@ -152,9 +152,9 @@ def _bent(found: xr.Dataset) -> list[str]:
     )  # fmt: skip
     safe = ("_samples", "_lower", "_upper", "_required", "_bounds", "_verdict", "_text", "_units")
     return [
-        str(name) for name, each in found.data_vars.items()
-        if not str(name).startswith(of_all) and not str(name).endswith(safe)
-        and each.dtype.kind == "f"
+        str(name) for name, each in found.variables.items()
+        if name not in found.coords and each.dtype.kind == "f"
+        and not str(name).startswith(of_all) and not str(name).endswith(safe)
     ]  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import math
 import re
 import textwrap
 from collections.abc import Iterator
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -379,6 +380,8 @@ def write(figure: Figure, path: Path) -> None:
 
 HEAVY = 120_000
 """Bytes of SVG above which a figure goes into a page as PNG."""
+_ARTISTS = 1500
+"""Artists of a figure whose SVG is beyond that: 400 to 600 took 100 to 170 thousand."""
 _DPI = 110
 _TALL = 0.7
 """Height over width from which on a figure takes a printed sheet of its own."""
@@ -386,35 +389,59 @@ _PIXELS = 96.0
 """Of a page in an inch; figures larger than drawn would have words larger than the page's."""
 
 
-@styled
-def inline(figure: Figure, name: str, words: str, heavy: int = HEAVY) -> str:
-    """An ``<svg>`` or ``<img>`` element that loads nothing and is described by ``words``; lines as
-    long as they take at most ``heavy`` characters.
+class Inline:
+    """A figure as an element of an HTML page that loads nothing and is described by ``words``.
 
     The same figure gives the same text.  Ids begin with ``name``, since all figures of a page
     share one space of them, and matplotlib numbers them alike in each.
     """
-    wide, high = figure.get_size_inches()
-    tall = ' class="tall"' * bool(high > _TALL * wide)
-    size = f'style="max-width: {_PIXELS * wide:.0f}px"{tall}'
-    held = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(held, format="svg", metadata={"Date": None})
-    text = held.getvalue()
-    if len(text) > heavy:
+
+    def __init__(self, figure: Figure, name: str, words: str) -> None:
+        self._figure, self._name, self._words = figure, name, words
+        wide, high = figure.get_size_inches()
+        tall = ' class="tall"' * bool(high > _TALL * wide)
+        self._size = f'style="max-width: {_PIXELS * wide:.0f}px"{tall}'
+
+    def element(self, heavy: int = HEAVY) -> str:
+        """``<svg>``, or ``<img>`` if that has more than ``heavy`` characters."""
+        # Of so many artists lines are never light, and drawing them would be in vain.
+        if len(self._figure.findobj()) > _ARTISTS or len(self._lines) > heavy:
+            return self._picture
+        return self._lines
+
+    @cached_property
+    def _placed(self) -> Figure:
+        """The figure with its layout found once, which costs as much as drawing it twice."""
+        self._figure.draw_without_rendering()
+        self._figure.set_layout_engine("none")
+        return self._figure
+
+    @cached_property
+    @styled
+    def _lines(self) -> str:
+        held, name = io.StringIO(), self._name
+        with matplotlib.rc_context({"svg.hashsalt": name}):
+            self._placed.savefig(held, format="svg", metadata={"Date": None})
+        text = held.getvalue()
+        text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+        text = re.sub(r'\bid="', f'id="{name}-', text)
+        text = re.sub(r'(xlink:href="|url\()#', rf"\g<1>#{name}-", text)
+        # In a page the size is that of the column; the names of its XML dialects are known there.
+        end = text.index(">")
+        opening = re.sub(r' (xmlns(:xlink)?|width|height|version)="[^"]*"', "", text[:end])
+        label = f' role="img" aria-label="{html.escape(self._words)}" {self._size}'
+        return opening + label + text[end:]
+
+    @cached_property
+    @styled
+    def _picture(self) -> str:
         picture = io.BytesIO()
-        figure.savefig(picture, format="png", dpi=_DPI, metadata={"Software": None})
+        self._placed.savefig(picture, format="png", dpi=_DPI, metadata={"Software": None})
         with Image.open(picture) as drawn:
             # 256 colours are a third of the bytes, and nobody sees a difference.
             few = drawn.convert("RGB").quantize(dither=Image.Dither.NONE)
         picture = io.BytesIO()
         few.save(picture, format="png", optimize=True)
         data = base64.b64encode(picture.getvalue()).decode("ascii")
-        return f'<img alt="{html.escape(words)}" {size} src="data:image/png;base64,{data}">'
-    text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
-    text = re.sub(r'\bid="', f'id="{name}-', text)
-    text = re.sub(r'(xlink:href="|url\()#', rf"\g<1>#{name}-", text)
-    # In a page the size is that of the column; the names of its XML dialects are known there.
-    opening = re.sub(r' (xmlns(:xlink)?|width|height|version)="[^"]*"', "", text[: text.index(">")])
-    label = f' role="img" aria-label="{html.escape(words)}" {size}'
-    return opening + label + text[text.index(">") :]
+        words = html.escape(self._words)
+        return f'<img alt="{words}" {self._size} src="data:image/png;base64,{data}">'

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 
 from ringsim.files import whole, writing
-from ringsim.plots.style import HEAVY, inline
+from ringsim.plots.style import HEAVY, Inline
 from ringsim.refusal import InputError
 
 if TYPE_CHECKING:
@@ -36,8 +36,9 @@ def written(
     )  # fmt: skip
     shell.filters["sentence"] = _sentence
     shape, text = shell.get_template(template), ""
+    each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
-        figures = [(name, words, inline(f, name, words, heavy)) for name, words, f in drawn]
+        figures = [(name, words, one.element(heavy)) for name, words, one in each]
         text = shape.render({**context, **_apart(figures, beside)})
         if len(text.encode("utf-8")) <= LARGEST:
             break

@@ -120,7 +120,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
 
 
 _POINTS = 400
-_INTERVALS = 20
+_INTERVALS = 12
 """Points of the band: each costs a bootstrap."""
 
 
