@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.cable import ropes
 from ringsim.cable.records import Cable
 from ringsim.layout.layout import layout_of
 from ringsim.plots.rods_and_cables import pulley_forces, section_spans
@@ -54,7 +53,7 @@ def compared(run: xr.Dataset) -> Compared:
     ratios = np.nan_to_num(of["pulley_ratio"].values, nan=1.0)
     shares = np.cumprod(np.vstack([np.ones(len(natural)), ratios]), axis=0)
     force = cable.axial_stiffness * (path - natural) / natural
-    mean = ropes.tension(force, np.array(cable.slack_width))
+    mean = cable.slack_width * np.logaddexp(0.0, force / cable.slack_width)
     return Compared(
         run["time"].values, _directions(run, scene, cable),
         path - natural * (1.0 + of["rope_strain"].values), of["cable_tension"].values[0],

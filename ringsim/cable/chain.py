@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ringsim.cable import ropes as slack
 from ringsim.cable.friction import LEAST_TENSION, Friction, Pulleys
 from ringsim.cable.ropes import Array, Flags, Ropes
 from ringsim.cable.winding import WinchReading
@@ -60,6 +59,14 @@ class ChainState:
     """Elastic and viscous force of each rope before smoothing (N), shape (ropes,)."""
     mean_tensions: Array
     """Mean tension of each rope, weighted by length (N), shape (ropes,)."""
+    viscous_forces: Array
+    """Viscous part of each rope's mean tension, in N, shape (ropes,)."""
+    energy_density: Array
+    """Elastic energy of each rope per natural length, in J/m, shape (ropes,)."""
+    friction_forces: Array
+    """Loss of tension over each pulley times the stretch there, in N, shape (pulleys,)."""
+    held_beyond: Array
+    """Natural length from each pulley to its rope's far end, m, shape (pulleys,)."""
     wound: Array
     wound_rate: Array
     """Of the winches at both ends of each cable, m and m/s, shape (cables, 2)."""
@@ -108,45 +115,15 @@ class ChainState:
         taut, loose = np.maximum(stretch, 0.0), np.minimum(stretch, 0.0)
         return np.asarray(self.lengths * (1.0 - taut[rope] * self.shares - loose[rope]))
 
-    @cached_property
-    def held_beyond(self) -> Array:
-        """Natural length from each pulley to its rope's far end, m, shape (pulleys,)."""
-        rope = self.ropes.of_pulley
-        total = np.zeros(len(self.lengths) + 1)
-        np.cumsum(self.lengths, out=total[1:])
-        beyond = total[self.ropes.ends[rope]] - total[self.ropes.behind]
-        return np.asarray(beyond * (self.natural / self.paths)[rope])
-
-    @cached_property
-    def friction_forces(self) -> Array:
-        """Loss of tension over each pulley times the stretch there, in N, shape (pulleys,)."""
-        before = self.tensions[self.ropes.behind - 1] * self.ropes.slips
-        lost = -np.expm1(self.exponents * self.log_decays)
-        return np.asarray(before * lost * (1.0 + self.strains[self.ropes.of_pulley]))
-
     @property
     def friction_loss(self) -> Array:
         """Power lost on each pulley, in W, never negative, shape (pulleys,)."""
         return self.friction_forces * self.speeds
 
-    @cached_property
-    def viscous_forces(self) -> Array:
-        """Viscous part of each rope's mean tension, in N, shape (ropes,)."""
-        stiffness, _, width = self.material
-        statically = slack.tension(stiffness * self.strains, width)
-        return self.mean_tensions - self.ropes.alive * statically
-
     @property
     def damping_loss(self) -> Array:
         """Power lost inside each rope, in W, never negative, shape (ropes,)."""
         return np.asarray(self.viscous_forces * self.strain_rates * self.natural)
-
-    @cached_property
-    def energy_density(self) -> Array:
-        """Elastic energy of each rope per natural length, in J/m, shape (ropes,)."""
-        stiffness, _, width = self.material
-        elastic = slack.energy(stiffness * self.strains, width)
-        return np.asarray(self.ropes.alive * elastic / stiffness)
 
     @property
     def elastic_energy(self) -> Array:
@@ -203,16 +180,15 @@ def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
     if before.ropes is not ropes:
         return 0.0, 0.0
     wound = after.wound - before.wound
-    pulls = 0.5 * (before.winch_forces + after.winch_forces)
-    carried = 0.5 * (before.energy_density + after.energy_density) * ropes.per_rope(wound)
+    pulls = before.winch_forces + after.winch_forces
+    carried = before.energy_density + after.energy_density
     slipped = before.held_beyond - after.held_beyond
-    cable = ropes.cable[ropes.of_pulley]
-    slipped -= (ropes.of_end[cable, 1] == ropes.of_pulley) * wound[cable, 1]
-    friction = 0.5 * (before.friction_forces + after.friction_forces) * slipped
-    viscous = 0.5 * (before.viscous_forces + after.viscous_forces)
-    viscous = viscous * 0.5 * (before.natural + after.natural) * (after.strains - before.strains)
-    driven = float(np.sum(pulls * wound) - np.sum(carried))
-    return driven, float(np.sum(friction) + np.sum(viscous))
+    slipped -= ropes.winds_beyond * wound[ropes.cable_of_pulley, 1]
+    rubbing = before.friction_forces + after.friction_forces
+    viscous = before.viscous_forces + after.viscous_forces
+    strained = 0.5 * (before.natural + after.natural) * (after.strains - before.strains)
+    driven = 0.5 * (np.vdot(pulls, wound) - carried @ ropes.per_rope(wound))
+    return float(driven), 0.5 * float(rubbing @ slipped + viscous @ strained)
 
 
 def pulley_tensions(ropes: Ropes, tensions: Array) -> Array:

@@ -151,7 +151,8 @@ class Chain:
         wound: Array, wound_rate: Array,
     ) -> ChainState:  # fmt: skip
         """What the spans tell, whose tensions are known."""
-        paths, path_rates, strains, strain_rates, forces, means = of_ropes(table, drums, spans)
+        told, at_pulleys = of_ropes(table, drums, spans, ropes.behind, log_decays)
+        paths, path_rates, strains, strain_rates, forces, means, viscous, density = told
         return ChainState(
             ropes=ropes,
             material=self.material[:, ropes.cable],
@@ -174,6 +175,10 @@ class Chain:
             strain_rates=strain_rates,
             forces=forces,
             mean_tensions=means,
+            viscous_forces=viscous,
+            energy_density=density,
+            friction_forces=at_pulleys[0],
+            held_beyond=at_pulleys[1],
             wound=wound,
             wound_rate=wound_rate,
         )

@@ -17,7 +17,9 @@ from ringsim.core.library import call
 #
 # Stretch.  S = sum L_i, natural length M = content - wound, mean strain e = (S - M) / M (paper
 # 001's element).  Mean tension q = b ln(1 + exp(y / b)) with y = EA (e + t_d de/dt): smooth in
-# slack, see ``ringsim.cable.ropes``; de/dt = (dS/dt + (S / M) w) / M with w the rate of winding.
+# slack; de/dt = (dS/dt + (S / M) w) / M with w the rate of winding.  Above y = 10 b the tension
+# exceeds y by less than 5e-5 b, below y = -10 b it is less than that; its energy is the integral of
+# q dy from -inf, b^2 (-Li2(-exp(y / b))).
 #
 # Friction.  T_i = c_i T_0, c_i = product over j <= i of eta_j^p_j, p_j = tanh(s_j / s_slip): full
 # decay towards the far end while the rope runs to the winch (s_j > 0), inverted where it runs back,
@@ -128,13 +130,17 @@ def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> 
     call("tighten", table, drums, log_decays, spans)
 
 
-def of_ropes(table: RopeTable, drums: Drums, spans: Spans) -> Array:
-    """Of ropes whose spans are known, shape (6, ropes): paths and their rates, strains and theirs,
-    forces before slack and mean tensions.
+def of_ropes(
+    table: RopeTable, drums: Drums, spans: Spans, behind: Indices, log_decays: Array
+) -> tuple[Array, Array]:
+    """Of ropes whose spans are known, shape (8, ropes): paths and their rates, strains and theirs,
+    forces before slack, mean tensions and their viscous parts (N), and elastic energies per natural
+    length (J/m); of pulleys, shape (2, pulleys): tension lost times stretch (N), and natural length
+    up to the rope's far end (m).
     """
-    out = np.zeros((6, len(table.starts)))
-    call("of_ropes", table, drums, spans, out)
-    return out
+    out, pulleys = np.zeros((8, len(table.starts))), np.zeros((2, len(behind)))
+    call("of_ropes", table, drums, spans, behind, log_decays, out, pulleys)
+    return out, pulleys
 
 
 # Derivatives of the cable's forces after positions and velocities of its points.

@@ -74,10 +74,11 @@ class Integration(Run):
         self._readings = Readings(model)
         self.history = Recorder(scene, self._readings.coordinates())
         ropes = None if model.cables is None else model.cables.ropes.content
+        first = self._measure(0.0, self._now)
         self._set_out(
-            self._measure(0.0, self._now),
+            first,
             scales_of(scene, model.layout, model.ideal, ropes),
-            Strained(self._energy.strain_energy(model.start), model.prestress),
+            Strained(self._energy.strained, model.prestress),
         )
 
     @property
@@ -220,8 +221,7 @@ class Integration(Run):
     def _known(self, time: float, state: State) -> Instant:
         """A state whose chain is known."""
         angles, rates = self._model.openings.read(state.pose.angle, state.rate.angles)
-        energies = self._energy.read(time, state, self._strains)
-        gap = self._model.gap(state.pose)
+        energies, gap = self._energy.read(time, state, self._strains)
         return self._told(time, angles, rates, energies, gap, state.chain)
 
 

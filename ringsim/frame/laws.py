@@ -170,18 +170,6 @@ class Acting(NamedTuple):
     soft: int
 
 
-def passing_joints(acting: Acting, angles: Array, rates: Array, lost: Array) -> float:
-    """Add torques that dissipate to ``lost``; returns the energy stored, J."""
-    return float(call("passing_joints", acting, angles, rates, lost))
-
-
-class Torques(NamedTuple):
-    """Torques on all angles that dissipate, shape (a,), N m, and energy stored, J."""
-
-    lost: Array
-    stored: float
-
-
 class Openings(NamedTuple):
     """Joint angles and senses of the opening angles, shape (planes, sections)."""
 
@@ -266,11 +254,6 @@ class JointLaws:
         rows, last = self.acting.tape.rows, self.acting.soft
         rows[_ON, :last] = np.concatenate([np.zeros(0), *self.switches.on])
         rows[_SETTING, :last] = np.concatenate([np.zeros(0), *self.switches.setting])
-
-    def passing(self, angles: Array, rates: Array) -> Torques:
-        """What all torques take and store."""
-        lost = self.damping * rates
-        return Torques(lost, passing_joints(self.acting, angles, rates, lost))
 
     def stop_torques(self, angles: Array, rates: Array) -> Array | None:
         """Torques of the stop, (planes, sections), N m; None without."""

@@ -14,7 +14,7 @@ from ringsim.frame.elimination import Border, Fronts
 from ringsim.frame.laws import Acting, JointLaws, Openings
 from ringsim.frame.mesh import CURE, NOT_HERE, Mesh, Skeleton, mesh_of
 from ringsim.frame.rods import Pose, Strains, add_forces, move, room_for_loads
-from ringsim.frame.springs import STIFFNESS, BeamSlide, RigidSlide, Slide, Web
+from ringsim.frame.springs import STIFFNESS, BeamSlide, Web
 from ringsim.frame.state import (
     Coefficients,
     Followed,
@@ -89,6 +89,8 @@ class FrameModel:
         What putting the structure together has left in its rods, J.
     with_hub, size
         Whether a net has a hub; number of unknowns: those of the mesh and the hub's three.
+    bent
+        The slide along a flexible boom, or None.
     system, unroped
         Its tables; that of ropes where there are none.
     others
@@ -124,17 +126,12 @@ class FrameModel:
         if scene.cables is not None:
             self.cables = FrameCables(scene.cables, skeleton, mesh, parts)
         self._stiffest = stiffest = float(mesh.stiffness[:, 0].max())
-        slides = [
-            RigidSlide(mesh, top, low, STIFFNESS * stiffest, turns * scene.structure.reach)
-            for top, low, turns in skeleton.slides
-        ]
+        self.bent = None
         self.others: list[BeamSlide | Hanging] = []
-        self.slides: list[Slide] = [*slides]
         if beam is not None:
             nodes = [(end.frame, end.axes) for end in skeleton.beam]
-            bent = BeamSlide(mesh, nodes, boom[0].length, beam.low.body, STIFFNESS * stiffest)
-            self.others.append(bent)
-            self.slides.append(bent)
+            self.bent = BeamSlide(mesh, nodes, boom[0].length, beam.low.body, STIFFNESS * stiffest)
+            self.others.append(self.bent)
         self.size = mesh.unknowns + 3 * self.with_hub
         # Forces and torques, ways and turns are compared by a length of the structure: sums of
         # their squares as they are would depend on the unit of length.
@@ -175,9 +172,9 @@ class FrameModel:
             cuts=np.cumsum([0, *sizes]),
             ends=ends,
             hung=np.array(lines_on, dtype=np.int64),
-            top=np.array([slide.top for slide in slides], dtype=np.int64),
-            low=np.array([slide.low for slide in slides], dtype=np.int64),
-            reach=np.array([slide.reach for slide in slides]),
+            top=np.array([top for top, *_ in skeleton.slides], dtype=np.int64),
+            low=np.array([low for _, low, _ in skeleton.slides], dtype=np.int64),
+            reach=scene.structure.reach * np.array([turns for *_, turns in skeleton.slides], float),
             stiffness=STIFFNESS * stiffest,
             damping=self.laws.damping,
             weighs=self.layout.gravity is not None,
@@ -225,12 +222,6 @@ class FrameModel:
             done += float(moved @ self.gravity)
         return done if self.hanging is None else done + self.hanging.work(state)
 
-    def gap(self, pose: Pose) -> float:
-        """Largest distance of a body from the boom that it slides along, m; revolutes cannot come
-        apart.
-        """
-        return max((slide.size(pose) for slide in self.slides), default=0.0)
-
     def tolerance(self, step: float, strains: Strains) -> float:
         """Residual norm at which Newton stops in a step (s), N, of torques over ``lengths``; not
         below what round-off leaves of coordinates: of inertia, of the rods with their damping, of
@@ -238,7 +229,7 @@ class FrameModel:
         """
         inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
         rods = self._stiffest * (1.0 + self._tau * strains.lead)
-        slides = STIFFNESS * self._stiffest if self.slides else 0.0
+        slides = STIFFNESS * self._stiffest * bool(self.skeleton.slides or self.bent)
         reached = 4.0 * sys.float_info.epsilon * (math.sqrt(self.size) * (inertia + rods) + slides)
         reached *= self._coordinates
         ropes = self._ropes.at(self.coefficients.rate_by_place(step))

@@ -2,15 +2,15 @@
 
 from contextlib import suppress
 from functools import cached_property
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from ringsim.cable.chain import ChainState, work_between
+from ringsim.core.library import call
 from ringsim.frame.mesh import Indices, Mesh
 from ringsim.frame.model import FrameModel
-from ringsim.frame.rods import Strains, energies_of
-from ringsim.frame.springs import passing_pairs
+from ringsim.frame.rods import Strains
 from ringsim.frame.state import State
 from ringsim.layout.bodies import Array, OnBody, OnRod
 from ringsim.layout.points import BOOM_TIP, HUB, Where, points_of
@@ -18,7 +18,7 @@ from ringsim.outputs.meters import Bodies, Meters, Places
 from ringsim.parts.laws import Switches
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import first_reaction
-from ringsim.stepping.instant import Energies, Passing, Remembering, lost_between
+from ringsim.stepping.instant import Energies, Remembering
 
 # What outputs read of a state, in joint coordinates.
 
@@ -169,11 +169,35 @@ def weights_of(mesh: Mesh, where: OnBody) -> Array:
     return row
 
 
-# Energies of a state, and what has passed since the state that was kept last.
+# Energies of a state, and what has passed since the state that was kept last (energies.c).
+
+
+class Measured(NamedTuple):
+    """What ``read_energies`` tells of a state: its energies, that of rods and slides alone, what
+    was lost since the state that was kept last (J), and the largest distance of a body from the
+    boom that it slides along (m).
+    """
+
+    kinetic: float
+    elastic: float
+    strained: float
+    lost: float
+    gap: float
+
+
+class Passed(NamedTuple):
+    """A reading: forces that take energy, places and rates that they resist, shape (3, n); its time
+    (s) and cables.
+    """
+
+    forces: Array
+    time: float
+    chain: ChainState | None
 
 
 class EnergyMeter(Remembering):
-    """Measures the energies of a model.
+    """Measures the energies of a model; ``strained`` is what the last reading has found in rods and
+    boom, and in what holds bodies on it, J.
 
     What friction, dampers and stops take is ``lost_between``; of ropes and winches see
     ``work_between``.
@@ -182,64 +206,52 @@ class EnergyMeter(Remembering):
     changing = ("_done",)
 
     def __init__(self, model: FrameModel) -> None:
-        self._model, self._damped = model, bool(model.mesh.tau.any())
-        self._kept: tuple[Passing, ChainState | None] | None = None
-        self._last: tuple[Passing, ChainState | None] | None = None
-        self._done = 0.0
+        self._model, mesh = model, model.mesh
+        self._hung = 0 if model.hanging is None else model.start.place.hung.size
+        damped = mesh.stiffness.size * bool(mesh.tau.any())
+        count = self._hung + model.start.pose.angle.size + len(model.web.first) + damped
+        self._rooms = np.zeros((3, count)), np.zeros((3, count))
+        self._last = self._kept = Passed(np.zeros((3, 0)), 0.0, None)
+        self._done = self.strained = 0.0
 
-    def read(self, time: float, state: State, strains: Strains) -> Energies:
-        """Energies of a state at a time (s) with its strains and, if there are cables, its chain.
+    def read(self, time: float, state: State, strains: Strains) -> tuple[Energies, float]:
+        """Energies of a state at a time (s) with its strains and, if there are cables, its chain;
+        and the largest gap of a joint, m.
 
         Losses and what winches put in count from the state that was kept last.
         """
-        model, mesh = self._model, self._model.mesh
-        pose = state.pose
-        torques = model.laws.passing(pose.angle, state.rate.angles)
-        kinetic, elastic = energies_of(mesh, state.rate.points, state.strains)
-        elastic += torques.stored + sum(slide.stored(pose) for slide in model.slides)
-        forces, places, rates = [torques.lost], [pose.angle], [state.rate.angles]
-        if len(model.web.second):
-            stored, resisting, lengths, along = passing_pairs(model.web, *state.net)
-            elastic += stored
-            forces.append(resisting)
-            places.append(lengths)
-            rates.append(along)
-        if model.with_hub:
-            moving = state.rate.hub[0]
-            kinetic += 0.5 * model.web.hub_mass * float(moving @ moving)
-        if model.hanging is not None:
-            hold = model.hanging.hold(state)
-            kinetic += model.hanging.kinetic(state)
-            elastic += hold.stored
-            forces.append(-hold.friction.ravel())
-            places.append(state.place.hung.ravel())
-            rates.append(state.rate.hung.ravel())
-        if self._damped:
-            straining = strains.lead * state.strains + strains.before
-            forces.append((mesh.tau[:, None] * mesh.stiffness * straining).ravel())
-            places.append(state.strains.ravel())
-            rates.append(straining.ravel())
-        if state.chain is not None:
-            elastic += float(state.chain.elastic_energy.sum())
-        passing = Passing(time, *(np.concatenate(each) for each in (forces, rates, places)))
-        self._last = passing, state.chain
-        lost = driven = 0.0
-        if self._kept is not None:
-            before, chain = self._kept
-            lost = lost_between(before, passing)
-            if chain is not None and state.chain is not None:
-                driven, rubbed = work_between(chain, state.chain)
+        model, hanging, kept = self._model, self._model.hanging, self._kept
+        own = self._rooms[kept.forces is self._rooms[0]]
+        hold = None
+        if hanging is not None:
+            hold = hanging.hold(state)
+            each = -hold.friction.ravel(), state.place.hung.ravel(), state.rate.hung.ravel()
+            own[:, : self._hung] = each
+        told = np.zeros(len(Measured._fields))
+        call(
+            "read_energies", model.system, state.table, strains, time - kept.time, own, kept.forces,
+            told,
+        )  # fmt: skip
+        kinetic, elastic, strained, lost, gap = told.tolist()
+        driven = 0.0
+        if model.bent is not None:
+            apart = model.bent.size(state.pose)
+            stored = 0.5 * model.bent.stiffness * apart**2
+            elastic, strained, gap = elastic + stored, strained + stored, max(gap, apart)
+        if hanging is not None and hold is not None:
+            kinetic, elastic = kinetic + hanging.kinetic(state), elastic + hold.stored
+        chain = state.chain
+        if chain is not None:
+            elastic += float(chain.elastic_energy.sum())
+            if kept.chain is not None:
+                driven, rubbed = work_between(kept.chain, chain)
                 lost += rubbed
-        return Energies(kinetic, elastic, self._done + model.work(state), lost, driven)
+        self._last, self.strained = Passed(own, time, chain), strained
+        return Energies(kinetic, elastic, self._done + model.work(state), lost, driven), gap
 
     def go_on_from(self, work: float, state: State) -> None:
         """Let other forces act from this state on, up to which loads have done so much work, J."""
         self._done = work - self._model.work(state)
-
-    def strain_energy(self, state: State) -> float:
-        """Of rods and boom, and of what holds bodies on it, J."""
-        elements = 0.5 * float(np.sum(self._model.mesh.stiffness * state.strains**2))
-        return elements + sum(slide.stored(state.pose) for slide in self._model.slides)
 
     def keep(self) -> None:
         """Count from the last reading on."""

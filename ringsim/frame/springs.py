@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.core.library import call
 from ringsim.frame.laws import Law, Tape, taped
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
 from ringsim.frame.rods import Pose
@@ -72,30 +71,7 @@ def _spots(mesh: Mesh, first: int, second: int) -> tuple[int, int, int]:
     return front, own.index(int(ends[0])), own.index(int(ends[1]))
 
 
-def stretched(
-    web: Web, ends: Array, rates: Array, hub: Array, hub_rate: Array
-) -> tuple[Array, Array, Array]:
-    """Lengths (m), their rates (m/s) and directions of all pairs, from the first end to the second,
-    at places and rates of the ends, shape (n, 3), and of the hub, (3,).
-    """
-    n = len(web.first)
-    lengths, along, units = np.empty(n), np.empty(n), np.empty((n, 3))
-    call("stretched", web, ends, rates, hub, hub_rate, lengths, along, units)
-    return lengths, along, units
-
-
-def passing_pairs(
-    web: Web, ends: Array, rates: Array, hub: Array, hub_rate: Array
-) -> tuple[float, Array, Array, Array]:
-    """Energy stored (J), dissipating forces of the pairs (N), their lengths (m) and rates of these
-    (m/s).
-    """
-    lengths, along, _ = stretched(web, ends, rates, hub, hub_rate)
-    lost = np.empty(len(lengths))
-    return float(call("passing_pairs", web, lengths, along, lost)), lost, lengths, along
-
-
-# Bodies that slide along a boom: a stiff spring across it.
+# Bodies that slide along a boom: a stiff spring across it; along a rigid one see balance.c.
 
 
 STIFFNESS = 100.0
@@ -103,60 +79,14 @@ STIFFNESS = 100.0
 
 
 class Gap(NamedTuple):
-    """Distances across the boom, and turns against it times a length where these are held, (n,), m,
-    and derivatives after the unknowns of frames (n, 6 f).
-    """
+    """Distances across the boom (n,), m, and derivatives after the unknowns of frames (n, 6 f)."""
 
     sizes: Array
     rows: Array
     frames: tuple[int, ...]
 
 
-class Slide:
-    """Holds the origin of a body on a line of other frames."""
-
-    def __init__(self, mesh: Mesh, low: int, stiffness: float) -> None:
-        self._mesh, self.low, self._stiffness = mesh, low, stiffness
-
-    def at(self, pose: Pose) -> Gap:
-        """The gap at a pose; the last of its frames is the body's."""
-        raise NotImplementedError
-
-    def size(self, pose: Pose) -> float:
-        """Of the gap, m."""
-        return math.hypot(*self.at(pose).sizes.tolist())
-
-    def stored(self, pose: Pose) -> float:
-        """Energy of the spring, J."""
-        return 0.5 * self._stiffness * self.size(pose) ** 2
-
-
-def aside(pose: Pose, top: int, low: int, reach: float) -> tuple[Array, Array]:
-    """Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12).
-
-    If turns are held, those about its axes times ``reach`` (m) stand behind, (5,) and (5, 12): half
-    the axial vector of R_1^T R_2, a turn as long as it is small; ``reach`` is else 0.
-    """
-    gaps, rows = np.empty(5), np.empty((5, 12))
-    size = call("aside", pose, top, low, reach, gaps, rows)
-    return gaps[:size], rows[:size]
-
-
-class RigidSlide(Slide):
-    """Along the z axis of body ``top``; ``reach`` is 0 in a sleeve, and that of ``aside`` in a
-    prismatic joint.
-    """
-
-    def __init__(self, mesh: Mesh, top: int, low: int, stiffness: float, reach: float) -> None:
-        super().__init__(mesh, low, stiffness)
-        self.top, self.reach = top, reach
-
-    def at(self, pose: Pose) -> Gap:
-        """See ``Slide``."""
-        return Gap(*aside(pose, self.top, self.low, self.reach), (self.top, self.low))
-
-
-class BeamSlide(Slide):
+class BeamSlide:
     """Along the cubic (Hermite) curves between the nodes of a boom with elements of a length, m.
 
     ``nodes`` are their frames and axes there, whose x is the curve's direction.
@@ -166,11 +96,11 @@ class BeamSlide(Slide):
         self, mesh: Mesh, nodes: Sequence[tuple[int, Array]], length: float, low: int,
         stiffness: float,
     ) -> None:  # fmt: skip
-        super().__init__(mesh, low, stiffness)
+        self._mesh, self.low, self.stiffness = mesh, low, stiffness
         self._nodes, self._length = nodes, length
 
     def at(self, pose: Pose) -> Gap:
-        """See ``Slide``: the gap to the curve's nearest point."""
+        """The gap to the curve's nearest point; the last of its frames is the body's."""
         place, length = pose.place[self.low], self._length
         ends = np.array([pose.place[f] for f, _ in self._nodes])
         tangents = np.array([pose.axes[f] @ own[:, 0] for f, own in self._nodes])
@@ -195,10 +125,14 @@ class BeamSlide(Slide):
         rows = (_ONE - np.outer(direction, direction)) @ rows
         return Gap(away, rows, (self._nodes[k][0], self._nodes[k + 1][0], self.low))
 
+    def size(self, pose: Pose) -> float:
+        """Of the gap, m."""
+        return math.hypot(*self.at(pose).sizes.tolist())
+
     def push(self, state: State, g: Array) -> None:
         """Add its force to the residual."""
         gap = self.at(state.pose)
-        forces = self._stiffness * (gap.sizes @ gap.rows)
+        forces = self.stiffness * (gap.sizes @ gap.rows)
         for n, frame in enumerate(gap.frames):
             k = self._mesh.home[frame]
             g[k : k + 6] += forces[6 * n : 6 * n + 6]
@@ -210,7 +144,7 @@ class BeamSlide(Slide):
         front = int(mesh.frame_local[list(gap.frames), 0].min())
         where = {int(spot): k for k, spot in enumerate(mesh.spots[front, : mesh.size[front]])}
         places = [where[int(mesh.home[f]) + k] for f in gap.frames for k in range(6)]
-        fronts[front][np.ix_(places, places)] += self._stiffness * (gap.rows.T @ gap.rows)
+        fronts[front][np.ix_(places, places)] += self.stiffness * (gap.rows.T @ gap.rows)
 
 
 _ONE = np.eye(3)

@@ -75,7 +75,7 @@ class Held(NamedTuple):
     """Where followed coordinates begin, shape (7,): points with mass, points of the cables, joint
     angles, the ends of the net's strings and its hub, bodies that hang on lines; bodies at the
     ends of strings, and on lines; bodies with a boom and those that slide along it, lengths (m) at
-    which their turns are held (see ``ringsim.frame.springs.aside``), and the stiffness of both
+    which their turns are held (see ``aside`` in balance.c), and the stiffness of both
     (N/m);
     linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2.
     """
@@ -93,9 +93,6 @@ class Held(NamedTuple):
 
 
 # The state of a model: where everything stands and how it moves.
-
-
-_NO_HUB = np.zeros(3)
 
 
 class Groups(NamedTuple):
@@ -148,14 +145,6 @@ class State:
     def acceleration(self) -> Groups:
         """As ``place``."""
         return Groups.of(self.followed.acceleration, self._held)
-
-    @property
-    def net(self) -> tuple[Array, Array, Array, Array]:
-        """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
-        hub = (
-            (_NO_HUB, _NO_HUB) if not len(self.place.hub) else (self.place.hub[0], self.rate.hub[0])
-        )
-        return self.place.ends, self.rate.ends, *hub
 
     def memory(self) -> Memory:
         """All but the cables, see ``ringsim.stepping.instant``."""

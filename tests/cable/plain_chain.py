@@ -3,20 +3,44 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from ringsim.cable.friction import Pulleys
 
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
+NODES, WEIGHTS = 0.5 * (NODES + 1.0), 0.5 * WEIGHTS
+
+
+def plain_tension(force, width):
+    """b ln(1 + exp(y / b)), N."""
+    return width * np.logaddexp(0.0, force / width)
+
+
+def plain_energy(force, width):
+    """Its integral after the force from -inf, N^2: -Li2(-s) = integral of ln(1 + s v) / v dv over
+    (0, 1) by 24 Gauss-Legendre nodes (error below 1e-14 for s <= 1), beyond that by its inversion.
+    """
+    z = force / width
+    tail = float(np.log1p(np.exp(-abs(z)) * NODES) / NODES @ WEIGHTS)
+    return width**2 * (0.5 * z**2 + np.pi**2 / 6.0 - tail if z > 0.0 else tail)
+
 
 @dataclass
 class Plain:
-    """What a rope tells: spans from the winch on, and the pulleys between them."""
+    """What a rope tells: spans from the winch on, and the pulleys between them; ``losses`` are
+    tensions lost at these times the stretch, ``beyond`` natural lengths behind them.
+    """
 
     tensions: list[float]
     speeds: list[float]
     exponents: list[float]
     mean: float
+    viscous: float
+    density: float
+    losses: list[float]
+    beyond: list[float]
 
 
 def plain_rope(cable, slip, points, velocities, content, wound, rates, alive=1.0, numbers=None):
@@ -35,7 +59,10 @@ def plain_rope(cable, slip, points, velocities, content, wound, rates, alive=1.0
     strain_rate = (path_rate + path / natural * winding) / natural
     force = cable.axial_stiffness * (strain + cable.damping_time * strain_rate)
     width = cable.slack_width
-    mean = alive * (max(force, 0.0) + width * np.log1p(np.exp(-min(abs(force) / width, 200.0))))
+    mean = alive * plain_tension(force, width)
+    elastic = cable.axial_stiffness * strain
+    viscous = mean - alive * plain_tension(elastic, width)
+    density = alive * plain_energy(elastic, width) / cable.axial_stiffness
     angle = [np.pi - np.arccos(np.clip(unit[j] @ unit[j + 1], -1.0, 1.0)) for j in range(n - 1)]
     speeds, exponents = [], []
     for j in range(1, n):
@@ -56,7 +83,9 @@ def plain_rope(cable, slip, points, velocities, content, wound, rates, alive=1.0
             shares.append(shares[-1] * float(np.exp(exponents[j] * decay[numbers[j]])))
         even = sum(c * size for c, size in zip(shares, length, strict=True)) / path
         tensions = [mean * c / even for c in shares]
-    return Plain(tensions, speeds, exponents, mean)
+    losses = [(a - b) * (1.0 + strain) for a, b in pairwise(tensions)]
+    beyond = [sum(length[j:]) * natural / path for j in range(1, n)]
+    return Plain(tensions, speeds, exponents, mean, viscous, density, losses, beyond)
 
 
 def plain_state(case):

@@ -7,7 +7,7 @@ import pytest
 from stribeck import StribeckFriction
 
 from cable_cases import RADIUS, Case, cable
-from plain_chain import plain_state
+from plain_chain import plain_energy, plain_state, plain_tension
 from ringsim.cable.friction import BearingFriction, CapstanFriction
 from ringsim.core.chain import Chain
 
@@ -59,3 +59,29 @@ def test_tensions_are_those_of_the_plain_chain(seed: int, jammed: bool, cut: boo
     assert found.exponents[slips] == pytest.approx(exponents, rel=1e-9, abs=1e-12)
     speeds = np.concatenate([rope.speeds for rope in truth])
     assert found.speeds[slips] == pytest.approx(speeds, rel=1e-9, abs=1e-14)
+    assert found.viscous_forces == pytest.approx([rope.viscous for rope in truth], rel=1e-7)
+    assert found.energy_density == pytest.approx([rope.density for rope in truth], rel=1e-9)
+    losses = np.concatenate([rope.losses for rope in truth])
+    assert found.friction_forces[slips] == pytest.approx(losses, rel=1e-9, abs=largest)
+    assert not found.friction_forces[~slips].any()
+    beyond = np.concatenate([rope.beyond for rope in truth])
+    assert found.held_beyond[slips] == pytest.approx(beyond, rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize("widths", [-250.0, -30.0, -1.0, 0.0, 0.3, 1.0, 39.9, 40.1, 1e9])
+def test_energy_of_a_slack_rope_is_the_dilogarithm(widths: float) -> None:
+    """At rest, by an elastic force of so many widths, in one span."""
+    width, stiffness = 0.05, 1e6
+    force = widths * width
+    own = cable(axial_stiffness=stiffness, slack_width=width)
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    case = Case(Chain([own], [3]), points, np.zeros((3, 3)), np.zeros((1, 2)), np.zeros((1, 2)))
+    case.points = points * (1.0 + force / stiffness)
+    state = case.state()
+    elastic = float(state.strains[0]) * stiffness
+    # Lengths of 2 m are rounded by 4e-16 m, that is by 2e-10 N.
+    assert elastic == pytest.approx(force, rel=1e-9, abs=1e-9)
+    assert state.energy_density[0] * stiffness == pytest.approx(
+        plain_energy(elastic, width), rel=1e-12, abs=0.0
+    )
+    assert state.mean_tensions[0] == pytest.approx(plain_tension(elastic, width), rel=1e-12)

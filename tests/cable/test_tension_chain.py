@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cable_cases import LAWS, RADIUS, Case, cable, decays, eta, random_case, still
-from ringsim.cable import ropes
 from ringsim.cable.friction import BearingFriction
 from ringsim.core.chain import Chain
 
@@ -112,17 +111,6 @@ def test_a_slack_rope_pulls_less_than_its_width_and_a_taut_one_like_a_spring():
         state = still([[0, 0, 0], [1, 0, 0], [2, 0, 0]], stretch, axial_stiffness=1e4).state()
         assert low <= state.mean_tensions[0] <= high
         assert state.is_slack[0] == (stretch < 0.0)
-
-
-@pytest.mark.parametrize("force", [-1e9, -3.0, 0.0, 0.4, 2.0, 1e9])  # 2: forty widths
-def test_the_energy_of_slack_is_the_integral_of_its_tension(force):
-    width = np.array(0.05)
-    step = max(1e-4, 1e-6 * abs(force))
-    above, below = (ropes.energy(np.array(force + s * step), width) for s in (1, -1))
-    # Central difference: step^2 q'' / 6 <= 1e-8, plus rounding of the energy over the step.
-    assert (above - below) / (2 * step) == pytest.approx(
-        ropes.tension(np.array(force), width), rel=1e-9, abs=2e-8
-    )
 
 
 def test_no_length_of_chain_or_friction_overflows():

@@ -22,7 +22,7 @@ from ringsim.core.turning import Seen
 from ringsim.dataset import save
 from ringsim.frame.integrate import Storing
 from ringsim.frame.model import FrameModel
-from ringsim.frame.readings import Readings
+from ringsim.frame.readings import EnergyMeter, Readings
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
 from ringsim.stored_state import read_state
@@ -73,6 +73,9 @@ def inside(thing: Any) -> dict[Any, Any] | None:
     if isinstance(thing, Winches):
         # These begin anew with every step.
         own = {name: one for name, one in own.items() if name not in ("_start", "_held", "_ropes")}
+    if isinstance(thing, EnergyMeter):
+        # Rooms are written before they are read.
+        own = {name: one for name, one in own.items() if name != "_rooms"}
     if isinstance(thing, Readings):
         # They look at a state when it is read.
         own = {name: one for name, one in own.items() if name not in ("now", "_state", "_strains")}

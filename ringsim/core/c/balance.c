@@ -38,13 +38,12 @@ static const D NUDGE = 1e-7;
 /* Rows of the laws' tape. */
 enum { STRETCH, RATE, ELASTIC, DAMPING, STORED };
 
-/* Lengths (m), their rates (m/s) and directions of all pairs, from the first end to the second, at
-   places and rates of the ends and of the hub. */
-void stretched(const Web *web, const D *ends, I n_ends, const D *rates, I n_rates, const D *hub,
-               I n_hub, const D *hub_rate, I n_hub_rate, D *lengths, I n_lengths, D *along, I n_along,
-               D *units, I n_units) {
-    (void)n_ends, (void)n_rates, (void)n_hub, (void)n_hub_rate, (void)n_lengths, (void)n_along,
-        (void)n_units;
+/* Lengths (m), their rates (m/s) and directions of all pairs, from the first end to the second. */
+static void stretched(const Web *web, const Held *held, const Followed *now, D *lengths, D *along,
+                      D *units) {
+    const I *cuts = held->cuts.at;
+    const D *ends = now->place.at + cuts[ENDS], *rates = now->rate.at + cuts[ENDS];
+    const D *hub = now->place.at + cuts[HUB], *hub_rate = now->rate.at + cuts[HUB];
     for (I k = 0; k < web->first.n; k++) {
         I one = web->first.at[k], other = web->second.at[k];
         Vec start = vector(one >= 0 ? ends + 3 * one : hub);
@@ -71,11 +70,10 @@ static D force_of(const Web *web, I k) {
     return row_of(&web->tape, ELASTIC)[k] + row_of(&web->tape, DAMPING)[k];
 }
 
-/* Dissipating forces of the pairs (N), beside their lengths and rates; returns the energy stored, J. */
-D passing_pairs(const Web *web, const D *lengths, I n_lengths, const D *along, I n_along, D *lost,
-                I n_lost) {
-    (void)n_lengths, (void)n_along, (void)n_lost;
-    D stored = 0.0;
+/* Dissipating forces of the pairs (N), their lengths and rates; returns the energy stored, J. */
+D passing_pairs(const Web *web, const Held *held, const Followed *now, D *lost, D *lengths, D *along) {
+    D stored = 0.0, units[3 * web->first.n + 3];
+    stretched(web, held, now, lengths, along, units);
     feel(web, lengths, along, 0.0, 0.0);
     for (I k = 0; k < web->first.n; k++) {
         lost[k] = row_of(&web->tape, DAMPING)[k];
@@ -86,11 +84,9 @@ D passing_pairs(const Web *web, const D *lengths, I n_lengths, const D *along, I
 
 /* What pairs tell of a state: measured once for forces and once for their changes. */
 #define MEASURED(web, held, now)                                                                   \
-    const I *cuts = held->cuts.at;                                                                 \
     I pairs = web->first.n;                                                                        \
     D lengths[pairs + 1], along[pairs + 1], units[3 * pairs + 3];                                  \
-    stretched(web, now->place.at + cuts[ENDS], 0, now->rate.at + cuts[ENDS], 0,                    \
-              now->place.at + cuts[HUB], 0, now->rate.at + cuts[HUB], 0, lengths, 0, along, 0, units, 0)
+    stretched(web, held, now, lengths, along, units)
 
 /* Add what resists at the bodies and, in the last three unknowns, at the hub; returns whether a
    string pulls at the hub. */
@@ -156,8 +152,7 @@ enum { MOST_GAPS = 5 };
 
 /* Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12); with turns about
    its axes times a reach (m) behind them, (5,) and (5, 12), if it is above 0.  Returns their number. */
-I aside(const Pose *pose, I top, I low, D reach, D *gaps, I n_gaps, D *rows, I n_rows) {
-    (void)n_gaps, (void)n_rows;
+static I aside(const Pose *pose, I top, I low, D reach, D *gaps, D *rows) {
     I size = reach > 0.0 ? MOST_GAPS : 2;
     Vec apart = minus(place_of(pose, low), place_of(pose, top));
     Mat axes = axes_of(pose, top), others = axes_of(pose, low);
@@ -183,11 +178,19 @@ I aside(const Pose *pose, I top, I low, D reach, D *gaps, I n_gaps, D *rows, I n
     return size;
 }
 
+/* Size of all gaps of a slide, m. */
+D slid_apart(const Held *held, const Pose *pose, I n) {
+    D gaps[MOST_GAPS], rows[12 * MOST_GAPS], sum = 0.0;
+    I size = aside(pose, held->top.at[n], held->low.at[n], held->reach.at[n], gaps, rows);
+    for (I k = 0; k < size; k++) sum += gaps[k] * gaps[k];
+    return sqrt(sum);
+}
+
 static void hold_slides(const Mesh *mesh, const Held *held, const Pose *pose, D *g) {
     for (I n = 0; n < held->top.n; n++) {
         I top = held->top.at[n], low = held->low.at[n];
         D gaps[MOST_GAPS], rows[12 * MOST_GAPS];
-        I size = aside(pose, top, low, held->reach.at[n], gaps, 0, rows, 0);
+        I size = aside(pose, top, low, held->reach.at[n], gaps, rows);
         for (I k = 0; k < size; k++) {
             D force = held->stiffness * gaps[k];
             for (int i = 0; i < 6; i++) {
@@ -204,7 +207,7 @@ static void add_slides(const Mesh *mesh, const Held *held, const Pose *pose, con
         const I *top = mesh->frame_local.at + 2 * held->top.at[n];
         const I *low = mesh->frame_local.at + 2 * held->low.at[n];
         D gaps[MOST_GAPS], rows[12 * MOST_GAPS], *front = front_of(fronts, top[0]);
-        I size = aside(pose, held->top.at[n], held->low.at[n], held->reach.at[n], gaps, 0, rows, 0);
+        I size = aside(pose, held->top.at[n], held->low.at[n], held->reach.at[n], gaps, rows);
         for (I i = 0; i < 12; i++)
             for (I j = 0; j < 12; j++) {
                 I row = i < 6 ? top[1] + i : low[1] + i - 6, column = j < 6 ? top[1] + j : low[1] + j - 6;

@@ -275,6 +275,11 @@ void add_joint_slopes(const Acting *acting, const D *angles, const D *rates, D b
 void note_joints(const Acting *acting, const Seen *rubbing, const D *rates);
 void add_dry_slopes(const Acting *acting, const Seen *rubbing, const D *angles, const D *rates,
                     D by_rate, const Mesh *mesh, const Fronts *fronts);
+D passing_joints(const Acting *acting, const D *angles, const D *rates, D *lost);
+D passing_pairs(const Web *web, const Held *held, const Followed *now, D *lost, D *lengths, D *along);
+D slid_apart(const Held *held, const Pose *pose, I n);
+void energies_of(const Mesh *mesh, const D *velocities, I n_velocities, const D *strains,
+                 I n_strains, D *out, I n_out);
 bool balance(const Mesh *mesh, const Lines *lines, const Held *held, const Acting *joints,
              const Web *web, const Coefficients *coefficients, D step, const Followed *start,
              const Pose *pose, const D *hub, const Arms *arms, const Followed *now,

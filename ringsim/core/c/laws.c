@@ -150,9 +150,7 @@ void add_dry_slopes(const Acting *acting, const Seen *rubbing, const D *angles, 
 }
 
 /* Add torques that dissipate to those of all angles; returns the energy stored, J. */
-D passing_joints(const Acting *acting, const D *angles, I n_angles, const D *rates, I n_rates,
-                 D *lost, I n_lost) {
-    (void)n_angles, (void)n_rates, (void)n_lost;
+D passing_joints(const Acting *acting, const D *angles, const D *rates, D *lost) {
     feel(acting, angles, rates, 0.0, 0.0);
     const D *damping = row_of(&acting->tape, DAMPING), *energy = row_of(&acting->tape, STORED);
     D stored = 0.0;

@@ -75,9 +75,13 @@ static D force_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
     return stretch * material[0];
 }
 
-static D tension_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
-    D force = force_of(ropes, drums, rope, path), width = ropes->material.at[3 * rope + 2];
+/* Tension of a force, slack within a width, without compression. */
+static D smooth(D force, D width) {
     return larger(force, 0.0) + width * log1p(exp(larger(-fabs(force) / width, -200.0)));
+}
+
+static D tension_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
+    return smooth(force_of(ropes, drums, rope, path), ropes->material.at[3 * rope + 2]);
 }
 
 /* Tensions of all spans, whose speeds are known. */
@@ -109,19 +113,52 @@ void tighten(const Ropes *ropes, const Drums *drums, const D *log_decays, I pull
     }
 }
 
-/* Of ropes whose spans are known, shape (6, ropes): paths and their rates, strains and theirs,
-   forces before slack and mean tensions. */
-void of_ropes(const Ropes *ropes, const Drums *drums, const Spans *spans, D *out, I n_out) {
-    (void)n_out;
-    I count = ropes->starts.n;
-    for (I rope = 0; rope < count; rope++) {
+/* The integral of the tension over the elastic force y up to this one, N^2: b^2 (-Li2(-exp(y / b)))
+   with the slack width b.  For s <= 1
+
+       -Li2(-s) = Li2(x) + ln(1 + s)^2 / 2,  x = s / (1 + s) <= 1 / 2,
+
+   whose series loses half of what is left with each term; larger ones follow from its inversion,
+   -Li2(-exp z) = z^2 / 2 + pi^2 / 6 + Li2(-exp(-z)) (DLMF 25.12.3, 25.12.4). */
+static D energy_of(D force, D width) {
+    static const D SIXTH = 1.6449340668482264; /* pi^2 / 6 */
+    enum { TERMS = 48 };
+    D z = force / width, s = exp(-fabs(z)), x = s / (1.0 + s), sum = 0.0, log = log1p(s);
+    /* Beside z^2 / 2 nothing of it is left. */
+    if (z > 40.0) return width * width * (0.5 * z * z + SIXTH);
+    for (I k = TERMS; k > 0; k--) sum = x * (1.0 / (D)(k * k) + sum);
+    sum += 0.5 * log * log;
+    return width * width * (z > 0.0 ? 0.5 * z * z + SIXTH - sum : sum);
+}
+
+/* Of ropes whose spans are known, shape (8, ropes): paths and their rates, strains and theirs, forces
+   before slack, mean tensions and the viscous part of these (N), and elastic energy per natural
+   length (J/m).  Of pulleys, shape (2, pulleys): tension lost there times the stretch (N), and
+   natural length up to the rope's far end (m). */
+void of_ropes(const Ropes *ropes, const Drums *drums, const Spans *spans, const I *behind, I pulleys,
+              const D *log_decays, I n_log_decays, D *out, I n_out, D *of_pulleys, I n_of_pulleys) {
+    (void)n_log_decays, (void)n_out, (void)n_of_pulleys;
+    I count = ropes->starts.n, j = pulleys - 1;
+    for (I rope = count - 1; rope >= 0; rope--) {
+        const D *material = ropes->material.at + 3 * rope;
         Path path = path_of(ropes, spans, rope);
-        D natural = drums->natural.at[rope], winding = drums->winding.at[rope];
-        out[rope] = path.length, out[count + rope] = path.rate;
-        out[2 * count + rope] = path.length / natural - 1.0;
+        D natural = drums->natural.at[rope], winding = drums->winding.at[rope], width = material[2];
+        D alive = ropes->alive.at[rope], strain = path.length / natural - 1.0;
+        D elastic = strain * material[0], mean = alive * tension_of(ropes, drums, rope, path);
+        out[rope] = path.length, out[count + rope] = path.rate, out[2 * count + rope] = strain;
         out[3 * count + rope] = (path.rate + path.length / natural * winding) / natural;
-        out[4 * count + rope] = force_of(ropes, drums, rope, path);
-        out[5 * count + rope] = ropes->alive.at[rope] * tension_of(ropes, drums, rope, path);
+        out[4 * count + rope] = force_of(ropes, drums, rope, path), out[5 * count + rope] = mean;
+        out[6 * count + rope] = mean - alive * smooth(elastic, width);
+        out[7 * count + rope] = alive * energy_of(elastic, width) / material[0];
+        D beyond = 0.0;
+        for (I i = ropes->ends.at[rope] - 1; i >= ropes->starts.at[rope]; i--) {
+            beyond += spans->length.at[i];
+            if (j < 0 || behind[j] != i) continue;
+            D lost = -expm1(spans->exponent.at[j] * log_decays[j]) * (ropes->pulley.at[i] >= 0);
+            of_pulleys[j] = spans->tension.at[i - 1] * lost * (1.0 + strain);
+            of_pulleys[pulleys + j] = beyond * natural / path.length;
+            j--;
+        }
     }
 }
 
