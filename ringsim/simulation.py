@@ -104,12 +104,13 @@ def prepare_run_frame(scene: Scene) -> None:
 
 
 def why_not_frame(scene: Scene) -> str:
-    """Why the frame engine cannot represent a scene; empty if it can."""
-    from ringsim.frame.model import FrameModel
-
+    """Why the frame engine cannot represent a scene, or what it records; empty if it can."""
     try:
         _refuse_other_rods(scene)
-        FrameModel(scene)
+        from ringsim.frame.model import FrameModel
+        from ringsim.frame.readings import Readings
+
+        Readings(FrameModel(scene))
     except InputError as error:
         return str(error)
     return ""
@@ -208,8 +209,8 @@ def simulate(
     scene
         A scene, or what ``load_scene`` reads: the name of a built-in one or a file.
     fidelity
-        "full", exudyn's multibody model, which it is if left out; or "frame", the same rods, joints
-        and cables several times as fast.
+        "full", exudyn's multibody model; "frame", the same rods, joints and cables some thirty
+        times as fast; if left out, "frame" wherever the scene allows it, else "full".
     start
         A stored state, see :func:`ringsim.read_state`: the run goes on from there to the end, with
         the engine of that state, and its dataset tells of all from the very beginning.
@@ -226,12 +227,14 @@ def simulate(
     """
     from ringsim.dataset import to_dataset
 
-    fidelity = fidelity or ("full" if start is None else start.engine)
+    chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene
+    if fidelity is None:
+        refused = start is None and why_not_frame(chosen)
+        fidelity = "full" if refused else "frame"
     if fidelity not in FIDELITIES:
         hint = known_or_nearest(fidelity, FIDELITIES)
         why = GONE.get(fidelity, f"there is no such model ({hint})")
         raise InputError(f"fidelity = {show(fidelity)}: {why}")
-    chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene
     require_fit(start, chosen, fidelity)
     if start is None:
         return to_dataset(FIDELITIES[fidelity](chosen), chosen)

@@ -78,8 +78,9 @@ class _Fidelity(click.Choice[str]):
 @click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write (default SCENE.nc).")
 @click.option(
     "--fidelity", type=_Fidelity(["full", "frame", "both"]),
-    help="Full model; the same in joint coordinates (frame: closed and open rings, several times "
-    "as fast); both, with a table of their differences.  [default: full, or what --accuracy picks]",
+    help="Full model; the same in joint coordinates (frame: closed and open rings, some thirty "
+    "times as fast); both, with a table of their differences.  [default: what --accuracy picks, or "
+    "frame wherever the scene allows it]",
 )  # fmt: skip
 @click.option(
     "--accuracy", metavar="ERROR", type=click.FloatRange(1e-8, 1.0),
@@ -117,7 +118,6 @@ def run_command(
     if accuracy is not None:
         chosen, fidelity = _with_accuracy(chosen, accuracy, of, evidence, settings, fidelity)
     start = _start(origin, at)
-    fidelity = fidelity or ("full" if start is None else start.engine)
     require_with("--of", of, "--accuracy", accuracy)
     require_with("--evidence", evidence, "--accuracy", accuracy)
     require_with("--plot-format", formats, "--plot", plot)
@@ -127,9 +127,14 @@ def run_command(
         raise InputError("--colour stress: needs the stresses: give --set record.stress=true, too")
     target = out or Path(f"{chosen.name}.nc")
 
-    from ringsim.simulation import run, run_frame
+    from ringsim.simulation import run, run_frame, why_not_frame
 
     require_file(target)
+    if fidelity is None:
+        refused = "" if start else why_not_frame(chosen)
+        fidelity = "full" if refused else "frame"
+        if refused:
+            click.echo(f"by the full model: {refused.rpartition(': ')[0]}")  # behind it: the cure
     for engine in ("frame", "full") if fidelity == "both" else (fidelity,):
         require_fit(start, chosen, engine)
     # The frame engine first: it refuses what it cannot represent.

@@ -86,10 +86,11 @@ def test_python_of_a_page_runs(page: Path, tmp_path: Path) -> None:
 def test_python_of_a_page_runs_in_the_full_model(page: Path, tmp_path: Path) -> None:
     """On a small ring; a state to go on from is the frame engine's alone, and refused with that."""
     text = "\n".join(blocks(page, "python"))
-    assert 'fidelity="frame"' in text
     smaller = '"structure.sections": 3, "solver.end_time": 0.3, "loads.force"'
     full = text.replace('fidelity="frame"', 'fidelity="full"').replace('"loads.force"', smaller)
-    full = full.replace('simulate("ring18"', 'simulate("truss2"')
+    full = full.replace("simulate(scene)", 'simulate(scene, fidelity="full")')
+    full = full.replace('simulate("ring18")', 'simulate("truss2", fidelity="full")')
+    assert full.count('fidelity="full"') >= 1
     if page.stem == "go_on":
         found = script(page, tmp_path, full, code=1)
         assert "choose fidelity" in found

@@ -47,7 +47,9 @@ def test_its_run_balances_energy_and_keeps_its_joints(example: dict[str, Any]) -
     assert list(run.plane.values) == ["upper", "lower", "inner upper", "inner lower"]
     # The bar of ring18 at its own tolerance: 3e-4 of deployment, 2e-3 with its impact.
     assert float(run.energy_error) < 3e-3
-    assert float(run.constraint_error) < 1e-9
+    # Frames hold the body on the boom by a spring a hundred times as stiff as a rod, 6e8 N/m, which
+    # forces of 1 N across the boom stretch by 2e-9 m.
+    assert float(run.constraint_error) < 5e-9
     assert np.isfinite(run.lock_time).all()
 
 

@@ -229,7 +229,8 @@ def test_places_and_names_survive_a_campaign(tmp_path, monkeypatch) -> None:
     run = simulate(
         load_scene("truss2").with_values(
             {"solver.end_time": 0.1, "cables.upper.friction.coefficient[2]": 0.001, **values}
-        )
+        ),
+        "full",
     )
     assert run.peak_tension_span == found.peak_tension_span[1]
     assert run.peak_tension.item() == found.peak_tension[1].item()

@@ -124,7 +124,7 @@ def test_a_real_run_that_starts_anew_took_more_than_its_last_start() -> None:
 
 def test_the_summary_of_a_run_says_that_it_started_anew(endings, tmp_path) -> None:
     endings(Status.DIVERGED, Status.DIVERGED, Status.OK)
-    arguments = ["run", "truss2", "--out", str(tmp_path / "run.nc")]
+    arguments = ["run", "truss2", "--fidelity", "full", "--out", str(tmp_path / "run.nc")]
     lines = CliRunner().invoke(cli, arguments).output.splitlines()
     (told,) = [line for line in lines if "restarted" in line]
     assert "restarted 2 times" in told
