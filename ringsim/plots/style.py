@@ -383,8 +383,6 @@ HEAVY = 120_000
 _ARTISTS = 1500
 """Artists of a figure whose SVG is beyond that: 400 to 600 took 100 to 170 thousand."""
 _DPI = 110
-_TALL = 0.7
-"""Height over width from which on a figure takes a printed sheet of its own."""
 _PIXELS = 96.0
 """Of a page in an inch; figures larger than drawn would have words larger than the page's."""
 
@@ -398,9 +396,7 @@ class Inline:
 
     def __init__(self, figure: Figure, name: str, words: str) -> None:
         self._figure, self._name, self._words = figure, name, words
-        wide, high = figure.get_size_inches()
-        tall = ' class="tall"' * bool(high > _TALL * wide)
-        self._size = f'style="max-width: {_PIXELS * wide:.0f}px"{tall}'
+        self._size = f'style="--wide: {_PIXELS * figure.get_size_inches()[0]:.0f}px"'
 
     def element(self, heavy: int = HEAVY) -> str:
         """``<svg>``, or ``<img>`` if that has more than ``heavy`` characters."""

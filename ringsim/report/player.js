@@ -221,9 +221,25 @@
   });
   for (const word of ["pointerup", "pointercancel"]) canvas.addEventListener(word, () => { held = null; });
   window.addEventListener("resize", draw);
-  // Half open says more on paper than a folded bundle.
+  // Half open says more than a folded bundle; a sheet, which nobody plays, has three moments.
   const mean = (moment) => anglesAt(moment).reduce((a, b) => a + b, 0) / joints;
-  const middle = (mean(0) + mean(end())) / 2;
-  time = sample.times.find((moment) => mean(moment) >= middle) || end();
+  const halfway = () => {
+    const middle = (mean(0) + mean(end())) / 2;
+    return sample.times.find((moment) => mean(moment) >= middle) || end();
+  };
+  window.addEventListener("beforeprint", () => {
+    const moments = [0, halfway(), end()], now = time, side = 600, high = 400;
+    [canvas.width, canvas.height] = [3 * side, high];
+    moments.forEach((moment, place) => {
+      time = moment;
+      pen.setTransform(1.5, 0, 0, 1.5, place * side, 0);
+      drawRing(side / 1.5, high / 1.5, anglesAt(moment), mean(moment));
+    });
+    time = now;
+    const words = moments.map((moment) => `${mean(moment).toFixed(1)} degree at ${moment.toFixed(2)} s`);
+    told.textContent = `${sample.name}; mean opening angle ${words.join(", ")}.`;
+  });
+  window.addEventListener("afterprint", () => { canvas.width = 0; draw(); });
+  time = halfway();
   draw();
 })();

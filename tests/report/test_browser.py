@@ -103,6 +103,31 @@ def test_the_page_plays_offline(
     assert seen["wide"] <= 0  # only tables and figures scroll sideways, within themselves
 
 
+PRINT = """<script>
+dispatchEvent(new Event("beforeprint"));
+document.body.dataset.told = document.getElementById("told").textContent;
+dispatchEvent(new Event("afterprint"));
+document.body.dataset.after = document.getElementById("told").textContent;
+</script></body>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
+def test_a_print_has_three_moments_for_the_player(tmp_path: Path) -> None:
+    text = page(made_campaign(8), "runs/made").replace("</body>", PRINT, 1)
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
+         f"--user-data-dir={tmp_path / 'profile'}", (tmp_path / "page.html").as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    told = re.search(r'data-told="([^"]*)"', done.stdout)
+    assert told is not None
+    assert re.match(r"sample \d+: .* at 0\.00 s, .* at \d.* s, .* at 10\.00 s\.$", told[1])
+    after = re.search(r'data-after="([^"]*)"', done.stdout)
+    assert after is not None
+    assert " s of 10.00 s, " in after[1]
+
+
 @pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
 def test_the_page_is_printed_with_what_it_folds(tmp_path: Path) -> None:
     save(made_campaign(8), tmp_path / "campaign.nc")
