@@ -19,7 +19,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
-from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 from matplotlib.text import Text
@@ -247,6 +247,12 @@ def name_sections(figure: Figure, axes: Axes) -> None:
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
 
 
+_LAGS = LinearSegmentedColormap.from_list(
+    "lags", ["#2d004b", "#64449c", "#9a9a9a", "#f4a63c", "#fff0c8"]
+)
+"""Lightness grows with the deviation: with two dark ends a print in grey would hide its sign."""
+
+
 def lag_image(axes: Axes, lags: xr.DataArray, span: float) -> QuadMesh:
     """Deviations (section, time) as a colour, at most ``span``: ahead orange, behind purple."""
     time, sections = lags["time"].values, lags["section"].values
@@ -255,7 +261,7 @@ def lag_image(axes: Axes, lags: xr.DataArray, span: float) -> QuadMesh:
     return axes.pcolormesh(
         edges, np.append(sections, sections[-1] + 1) - 0.5,
         lags.transpose("section", "time").values,
-        cmap="PuOr_r", vmin=-span, vmax=span, rasterized=True,
+        cmap=_LAGS, vmin=-span, vmax=span, rasterized=True,
     )  # fmt: skip
 
 

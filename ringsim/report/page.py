@@ -92,7 +92,7 @@ def _comments(text: str) -> dict[str, str]:
 _ANSWERS = ("one_by_one", "rare_event", "distributions", "margin", "fan", "latch_rate")
 """Figures that answer what campaigns are run for, in the order in which they are told; the first
 ``_FIRST`` of them stand on the first page, all others are evidence, but ``_MATTERS``, which stands
-where it is told what matters."""
+where it is told what matters, unless nothing does."""
 _MATTERS = "tornado"
 _FIRST = 3
 
@@ -122,6 +122,8 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     shown = player(campaign, analysis)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = values_of(campaign)
+    told = sections(analysis, folder)
+    matters = "matters" in told and any(each.rows for each in told["matters"].tables)
     drawn = sorted(figures_of(campaign), key=lambda each: _turn(each[0].name))
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
@@ -132,7 +134,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "not_run": int((endings(campaign) == "not run").sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
-        "told": sections(analysis, folder), "notes_on_all": head_lines(analysis)[1:],
+        "told": told, "notes_on_all": head_lines(analysis)[1:],
         "names": {name: campaign[name].attrs.get("long_name", "") for name in outputs_in(analysis)
                   if name in campaign},
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
@@ -145,9 +147,8 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
         "provenance": list(tables.provenance(campaign)),
     }  # fmt: skip
-    figures = [(p.name, p.words, f) for p, f in drawn]
-    beside = _MATTERS if "matters" in context["told"] else ""
-    return written("page.html.j2", context, figures, beside=beside)
+    figures = [(p.name, p.words, f) for p, f in drawn if matters or p.name != _MATTERS]
+    return written("page.html.j2", context, figures, beside=_MATTERS)
 
 
 def _turn(name: str) -> int:

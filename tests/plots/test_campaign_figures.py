@@ -18,6 +18,7 @@ from ringsim.analysis.design import median_and_worst
 from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.outputs.family import VARIABLES
 from ringsim.plots import style
 from ringsim.plots.campaign import endings
 from ringsim.plots.campaign.courses import lock_order, shares
@@ -332,6 +333,45 @@ def test_panels_are_for_numbers_that_differ_or_have_limits() -> None:
     names, flat = shown(campaign)
     assert {"deployment_time", "latched_joints"} <= set(names)
     assert "deployment_time" not in flat
+
+
+def test_a_sheet_has_the_panels_that_matter_and_names_the_others() -> None:
+    """Nine at most: what is required first, and inputs in the order of their correlations."""
+    campaign = made_campaign(8)
+    wanted = {"max": 9.0, "probability": 0.9, "confidence": 0.9}
+    campaign.attrs["requirements"] = json.dumps({"total_motor_energy": wanted})
+    every = [n for n, each in VARIABLES.items() if each.summary is not None and each.dtype == "f8"]
+    for name in every:
+        campaign[name] = "sample", np.arange(8.0)
+    names, told = shown(campaign)
+    assert len(names) == 9
+    assert names[0] == "total_motor_energy"
+    others = told.removesuffix(".").partition("Not drawn: ")[2].split(", ")
+    assert others[0]
+    assert not set(others) & set(names)
+    assert sum(axes.get_visible() for axes in convergence(campaign).axes) == 9
+    dice = np.random.default_rng(1)
+    for k in range(20):
+        about = {"role": "input", "input": f"input {k}", "units": "1"}
+        values = dice.random(8) if k < 19 else -campaign["asynchrony_max"].values
+        campaign[f"input_{k}"] = "sample", values, about
+    figure = by_input(campaign)
+    labels = [axes.get_xlabel() for axes in figure.axes if axes.get_visible()]
+    assert len(labels) == 9
+    assert labels[0].startswith("cables.lower_winch_stop_time")
+    assert any(label.startswith("input 19") for label in labels[:5])
+    assert "inputs whose rank correlation with the number is smaller" in words(figure)
+
+
+def test_lags_ahead_are_lighter_than_lags_behind() -> None:
+    """So that a print in grey has their sign."""
+    axes = Figure().subplots()
+    times, sections = np.arange(2.0), np.arange(1, 10)
+    lags = np.linspace(-1.0, 1.0, 9)[:, None] * np.ones(2)
+    lags = xr.DataArray(lags, {"section": sections, "time": times}, ("section", "time"))
+    image = style.lag_image(axes, lags, 1.0)
+    grey = image.to_rgba(lags.values[:, 0])[:, :3] @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(grey) > 0.02).all()
 
 
 def test_settings_of_the_solver_are_no_inputs_beside_the_antenna_s() -> None:

@@ -110,6 +110,19 @@ def test_the_answer_comes_before_failures_and_what_it_is_from(
     assert not re.search(r"<details[^>]* open", text)
 
 
+def test_the_page_has_no_figure_of_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = [each for each in of_campaigns.PICTURES if each.name == "tornado"]
+    monkeypatch.setattr(of_campaigns, "PICTURES", own)
+    assert 'id="figure-tornado"' in page(made_campaign(30), "runs/made")
+    campaign = made_campaign(30)
+    dice = np.random.default_rng(5)
+    for name in ("asynchrony_max", "peak_tension", "deployment_time"):
+        campaign[name] = "sample", 1.0 + dice.random(30)
+    text = page(campaign, "runs/made")
+    assert "o input matters more than chance would explain" in text
+    assert 'id="figure-tornado"' not in text
+
+
 def test_a_page_that_would_be_too_large_has_pictures_for_lines(monkeypatch) -> None:
     campaign = made_campaign(8)
     lines = page(campaign, "runs/made")

@@ -41,6 +41,10 @@ def looks_of(words: NDArray[np.str_]) -> dict[str, tuple[str, str]]:
     return {word: look for word, look in looks.items() if (words == word).any()}
 
 
+_LINE = 0.16
+"""Height of a line of a caption in inch; a sheet has room for two."""
+
+
 def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> None:
     """Subject and campaign above the sheet, the number of samples and their fate below it."""
     inches = figure.get_size_inches()[0]
@@ -48,6 +52,7 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
         subject += lost.mark
         caption += f"\n{lost.mark.strip()} {lost.note[0].upper()}{lost.note[1:]}."
     words = "\n".join(textwrap.fill(each, int(12.0 * inches)) for each in caption.split("\n"))
+    figure.set_figheight(figure.get_figheight() + _LINE * max(0, words.count("\n") - 1))
     name = str(campaign.attrs.get("title", "")).strip()
     style.title(figure, textwrap.fill(f"{subject}: {name}".rstrip(": "), int(10.3 * inches)))
     if figure.legends:  # what stands outside of the axes twice would stand on one another
@@ -72,15 +77,17 @@ def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
     return wanted[name].limits if name in wanted else []
 
 
+MOST_PANELS = 9
+"""Of a sheet: more could not be read."""
 _APART = 1e-3
 """Range of a number over its size below which a panel of its own shows nothing: no digit of it that
 tables give changes."""
 
 
-def shown(campaign: xr.Dataset) -> tuple[list[str], str]:
-    """Main numbers that differ between samples or have limits, and a word on those that do not.
+def shown(campaign: xr.Dataset, most: int = MOST_PANELS) -> tuple[list[str], str]:
+    """So many main numbers that differ between samples or have limits, and a word on others.
 
-    All of them if none differs.
+    All count if none differs.  Those with limits go first if there are more.
     """
     limited = required_by(campaign.attrs)
     names = scalars(campaign)
@@ -92,10 +99,14 @@ def shown(campaign: xr.Dataset) -> tuple[list[str], str]:
     known = {name: values_of(campaign, name)[1] for name in names}
     several = [name for name in names if name not in limited and len(known[name]) > 1]
     flat = [name for name in several if np.ptp(known[name]) < _APART * np.abs(known[name]).max()]
-    if not flat or len(flat) == len(names):
-        return names, ""
-    rest = [name for name in names if name not in flat]
-    return rest, f" The same in all samples within {100 * _APART:g} %: {', '.join(flat)}."
+    told = ""
+    if flat and len(flat) < len(names):
+        told = f" The same in all samples within {100 * _APART:g} %: {', '.join(flat)}."
+        names = [name for name in names if name not in flat]
+    if len(names) > most:
+        names.sort(key=lambda name: name not in limited)
+        told += f" Not drawn: {', '.join(names[most:])}."
+    return names[:most], told
 
 
 def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:

@@ -22,6 +22,7 @@ from ringsim.analysis.design import (
     told,
     values_of,
 )
+from ringsim.analysis.indices import centred_ranks
 from ringsim.analysis.intervals import good, numbers, quantile, ran, tells_of
 from ringsim.analysis.requirements import OUTCOME, Requirement, required_by, violations
 from ringsim.analysis.tails import approach, subset_simulation, tail
@@ -29,6 +30,7 @@ from ringsim.analysis.verdicts import judge
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import (
+    MOST_PANELS,
     WIDE,
     head,
     in_lines,
@@ -120,6 +122,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
 
 
 _POINTS = 400
+_MOST_REQUIRED = 6
 _INTERVALS = 12
 """Points of the band: each costs a bootstrap."""
 
@@ -191,7 +194,10 @@ def convergence(campaign: xr.Dataset) -> Figure:
     """
     placed, wanted = placement(campaign), _required(campaign)
     campaign, blocks = standing(campaign)
-    names, flat = shown(campaign)
+    names, flat = shown(campaign, MOST_PANELS - min(len(wanted), _MOST_REQUIRED))
+    if others := [*wanted][_MOST_REQUIRED:]:
+        flat += f" Not drawn: the requirements of {', '.join(others)}."
+        wanted = {name: wanted[name] for name in [*wanted][:_MOST_REQUIRED]}
     count = len(names) + len(wanted)
     figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3)
     for axes, name in zip(panels, names, strict=False):
@@ -262,7 +268,8 @@ def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
 
 @picture("campaign", 80, "What became of each sample, by each drawn input", applies=_has_run)
 def by_input(campaign: xr.Dataset) -> Figure:
-    """A panel an input: the main number of each sample that has run over the value drawn for it.
+    """A panel an input: the main number of each sample that has run over the value drawn for it;
+    of more inputs than a sheet has room for those of words and those that go with it most.
 
     Colour and marker say how the sample ended; samples without the number stand below the line at
     the foot of each panel.
@@ -278,6 +285,10 @@ def by_input(campaign: xr.Dataset) -> Figure:
     size = high - low or max(abs(high), 1.0)
     foot = low - 0.16 * size
     height = np.where(np.isfinite(height), height, foot)
+    others = len(names) - MOST_PANELS
+    if others > 0:
+        names = sorted(names, key=lambda each: -_together(drawn(campaign[each]), height))
+        names = names[:MOST_PANELS]
     figure, panels, columns = style.new_panels(len(names), 3.5, 2.8, 1.4)
     for number, (axes, each) in enumerate(zip(panels, names, strict=True)):
         places, labels = drawn(campaign[each])
@@ -300,9 +311,20 @@ def by_input(campaign: xr.Dataset) -> Figure:
     note = (
         " Inputs of many places by their mean." if any(campaign[n].ndim > 1 for n in names) else ""
     )
+    if others > 0:
+        note += f" Not drawn: {others} inputs whose rank correlation with the number is smaller."
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
     head(figure, campaign, "Outcome by input", f"{count}{below}.{note}")
     return figure
+
+
+def _together(column: tuple[NDArray[np.floating], list[str]], height: Array) -> float:
+    """Size of an input's rank correlation with a number; words have none, and come first."""
+    if column[1]:
+        return np.inf
+    ranks = centred_ranks(np.stack([column[0], height], axis=1))
+    size = np.linalg.norm(ranks, axis=0).prod()
+    return float(abs(ranks[:, 0] @ ranks[:, 1]) / size) if size else 0.0
 
 
 def _of_antenna(variable: xr.DataArray) -> bool:

@@ -32,7 +32,7 @@ from ringsim.analysis.requirements import required_by
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import head, in_lines, legend, looks_of
+from ringsim.plots.campaign.frame import MOST_PANELS, head, in_lines, legend, looks_of
 from ringsim.plots.registry import picture
 from ringsim.stepping.instant import Array
 from ringsim.tables import unit_behind
@@ -54,7 +54,6 @@ _INSIDE = {
 """What a second, thinner bar shows beside it."""
 _BY_CHANCE = "the largest by chance in one case of 20"
 _MOST = 8
-_MOST_PANELS = 9
 _NONE = np.empty(0), np.empty((0, 2)), np.empty(0), np.empty((0, 2))
 
 
@@ -200,11 +199,11 @@ def tornado(campaign: xr.Dataset) -> Figure:
     every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
     quiet = [name for name, bars in every if bars.measure and not bars.names]
     every = [each for each in every if each[0] not in quiet]
-    found = every[:_MOST_PANELS]
+    found = every[:MOST_PANELS]
     found = found or [("", Bars("", [], *_NONE, np.nan, "nothing beyond chance" if quiet else
                                 "no measure is known"))]  # fmt: skip
     rows = max(len(bars.names) for _, bars in found)
-    figure, panels, _ = style.new_panels(len(found), 5.2, 0.9 + 0.34 * rows, 1.1, most=2)
+    figure, panels, _ = style.new_panels(len(found), 5.2, 1.3 + 0.34 * rows, 1.1, most=2)
     certain, uncertain = False, False
     for axes, (output, bars) in zip(panels, found, strict=True):
         _draw(axes, bars)
@@ -234,7 +233,7 @@ def tornado(campaign: xr.Dataset) -> Figure:
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", whiskers, of]))
     if quiet:
         caption += f" No input matters more than chance would explain for {', '.join(quiet)}."
-    if others := [name for name, _ in every[_MOST_PANELS:]]:
+    if others := [name for name, _ in every[MOST_PANELS:]]:
         caption += f" Not drawn: {', '.join(others)}."
     head(figure, campaign, "What matters", caption)
     return figure
