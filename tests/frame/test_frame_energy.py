@@ -7,6 +7,9 @@ import pytest
 
 from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
+from ringsim.frame.model import FrameModel
+from ringsim.frame.readings import EnergyMeter
+from ringsim.frame.rods import Strains
 from ringsim.scene import load_scene
 from ringsim.stepping.instant import Passing, lost_between
 
@@ -49,3 +52,33 @@ def test_viscous_losses_of_even_acceleration_are_exact(told: bool) -> None:
     assert lost_between(at(begin), at(2.6)) == pytest.approx(exact, rel=1e-12)
     halves = lost_between(at(begin), at(2.3)) + lost_between(at(2.3), at(2.6))
     assert halves == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.quick
+def test_the_core_takes_losses_and_energies_as_the_formulas_say() -> None:
+    """Of a ring with damped rods and viscous hinges, in two states at random."""
+    values = {
+        "structure.sections": 3, "rods.damping": 1e-3, "net": "none", "boom": "none",
+        "joints.hinge.viscous": 0.02, "joints.pivot.viscous": 0.01,
+    }  # fmt: skip
+    model = FrameModel(load_scene("ring18").with_values(values))
+    mesh, random, meter = model.mesh, np.random.default_rng(3), EnergyMeter(model)
+    told, passings = [], []
+    for time in (0.0, 0.02):
+        state = model.start.copy()
+        state.pose.angle[:] += 1e-3 * random.normal(size=state.pose.angle.shape)
+        state.followed.rate[:] = random.normal(size=state.followed.rate.shape)
+        state.strains[:] = 1e-5 * random.normal(size=state.strains.shape)
+        before = 1e-3 * random.normal(size=state.strains.shape)
+        told.append(meter.read(time, state, Strains(state.strains, before, 50.0))[0])
+        meter.keep()
+        straining = 50.0 * state.strains + before
+        forces = model.laws.damping * state.rate.angles, 1e-3 * mesh.stiffness * straining
+        places, rates = (state.pose.angle, state.strains), (state.rate.angles, straining)
+        rows = (np.concatenate([a.ravel(), b.ravel()]) for a, b in (forces, rates, places))
+        passings.append(Passing(time, *rows))
+        elastic = 0.5 * np.sum(mesh.stiffness * state.strains**2)
+        assert told[-1].elastic == pytest.approx(elastic, rel=1e-12)
+    assert model.laws.damping.max() > 0.0
+    assert told[0].lost == 0.0
+    assert told[1].lost == pytest.approx(lost_between(*passings), rel=1e-10)
