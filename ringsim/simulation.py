@@ -227,15 +227,19 @@ def simulate(
     """
     from ringsim.dataset import to_dataset
 
-    chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene
-    if fidelity is None:
-        refused = start is None and why_not_frame(chosen)
-        fidelity = "full" if refused else "frame"
-    if fidelity not in FIDELITIES:
+    if fidelity is not None and fidelity not in FIDELITIES:
         hint = known_or_nearest(fidelity, FIDELITIES)
         why = GONE.get(fidelity, f"there is no such model ({hint})")
         raise InputError(f"fidelity = {show(fidelity)}: {why}")
-    require_fit(start, chosen, fidelity)
-    if start is None:
-        return to_dataset(FIDELITIES[fidelity](chosen), chosen)
-    return to_dataset(run_frame(chosen, start=start), chosen)
+    chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene
+    require_fit(start, chosen, fidelity or "frame")
+    if start is not None:
+        outcome = run_frame(chosen, start=start)
+    elif fidelity is not None:
+        outcome = FIDELITIES[fidelity](chosen)
+    else:
+        try:
+            outcome = run_frame(chosen)
+        except InputError:  # the full model says what is wrong if that is not the frames' alone
+            outcome = run(chosen)
+    return to_dataset(outcome, chosen)

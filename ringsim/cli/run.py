@@ -127,24 +127,24 @@ def run_command(
         raise InputError("--colour stress: needs the stresses: give --set record.stress=true, too")
     target = out or Path(f"{chosen.name}.nc")
 
-    from ringsim.simulation import run, run_frame, why_not_frame
+    from ringsim.simulation import run, run_frame
 
     require_file(target)
-    if fidelity is None:
-        refused = "" if start else why_not_frame(chosen)
-        fidelity = "full" if refused else "frame"
-        if refused:
-            click.echo(f"by the full model: {refused.rpartition(': ')[0]}")  # behind it: the cure
-    for engine in ("frame", "full") if fidelity == "both" else (fidelity,):
-        require_fit(start, chosen, engine)
     # The frame engine first: it refuses what it cannot represent.
-    engines = {"frame": run_frame, "full": run}
-    outcomes = {
-        name: watched(partial(engine, start=start), chosen)
-        for name, engine in engines.items() if fidelity in (name, "both")
-    }  # fmt: skip
+    asked = ("frame", "full") if fidelity == "both" else (fidelity or "frame",)
+    for name in asked:
+        require_fit(start, chosen, name)
+    engines = {"frame": partial(run_frame, start=start), "full": partial(run, start=start)}
+    try:
+        outcomes = {name: watched(engines[name], chosen) for name in asked}
+    except InputError as error:
+        if fidelity is not None or start is not None:
+            raise
+        # Behind the last colon stands the cure, which is taken here.
+        click.echo(f"the full model runs it: {str(error).rpartition(': ')[0] or error}")
+        outcomes = {"full": watched(engines["full"], chosen)}
     if start is not None:  # told once nothing has refused it
-        click.echo(outcomes[fidelity].began)
+        click.echo(outcomes[asked[0]].began)
     from ringsim.dataset import save, to_dataset  # behind the run: xarray takes most of a second
 
     datasets = [to_dataset(outcome, chosen) for outcome in outcomes.values()]

@@ -186,11 +186,11 @@ class Measured(NamedTuple):
 
 
 class Passed(NamedTuple):
-    """A reading: forces that take energy, places and rates that they resist, shape (3, n); its time
-    (s) and cables.
+    """A reading: forces that take energy, places that they resist and their rates as ``rows``,
+    shape (3, n), N and m or N m and rad; its time (s) and cables.
     """
 
-    forces: Array
+    rows: Array
     time: float
     chain: ChainState | None
 
@@ -221,7 +221,7 @@ class EnergyMeter(Remembering):
         Losses and what winches put in count from the state that was kept last.
         """
         model, hanging, kept = self._model, self._model.hanging, self._kept
-        own = self._rooms[kept.forces is self._rooms[0]]
+        own = self._rooms[kept.rows is self._rooms[0]]
         hold = None
         if hanging is not None:
             hold = hanging.hold(state)
@@ -229,7 +229,7 @@ class EnergyMeter(Remembering):
             own[:, : self._hung] = each
         told = np.zeros(len(Measured._fields))
         call(
-            "read_energies", model.system, state.table, strains, time - kept.time, own, kept.forces,
+            "read_energies", model.system, state.table, strains, time - kept.time, own, kept.rows,
             told,
         )  # fmt: skip
         kinetic, elastic, strained, lost, gap = told.tolist()

@@ -123,6 +123,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
 
 _POINTS = 400
 _MOST_REQUIRED = 6
+"""Requirements on a sheet of ``MOST_PANELS``, which leaves numbers a row."""
 _INTERVALS = 12
 """Points of the band: each costs a bootstrap."""
 
