@@ -10,8 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from ringsim.choice import leaves_of
-from ringsim.parts.persection import EACH, ONE
-from ringsim.units import LEFT_OUT, Model, nested_in, unit_of
+from ringsim.units import EACH, LEFT_OUT, ONE, Model, nested_in, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""

@@ -18,10 +18,10 @@ from scipy.interpolate import CubicSpline
 
 from ringsim.cable.chain import ChainState
 from ringsim.core.chain import Chain
-from ringsim.parts.persection import at_section
 from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene
+from ringsim.units import at_section
 
 TIGHT = 1e-8
 """Local error of a step over the rate; the rates of angles and ropes are of order 0.01 to 1."""

@@ -7,8 +7,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 
 from ringsim.cable.ropes import Array
-from ringsim.parts.persection import PerSection
-from ringsim.units import FrictionCoefficient, MetreOrZero, Model
+from ringsim.units import FrictionCoefficient, MetreOrZero, Model, PerSection
 
 # Slip speed that regularises pulley friction, and the error that it causes at low speed.
 #

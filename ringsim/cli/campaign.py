@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.campaign.folder import open_folder, other_build
-from ringsim.campaign.plan import plan
+from ringsim.campaign.plan import plan, status_lines
 from ringsim.campaign.run import Order, Share, require_no_launcher, start
 from ringsim.campaign.specification import SOLVERS, load_campaign
-from ringsim.campaign.status import status_lines
 from ringsim.campaign.stopping import as_decided
 from ringsim.cli.options import (
     FOLDER,

@@ -300,7 +300,7 @@ def compare_command(
             click.echo(line)
         _save(found, out)
         if page is not None:
-            from ringsim.report.comparison import write_comparison
+            from ringsim.report.page import write_comparison
 
             _told_page(page, write_comparison(found, one, other, page), pdf=pdf)
 
@@ -341,8 +341,7 @@ def export_command(
     out: Path | None,
 ) -> None:  # fmt: skip
     """Write a run, or a campaign, from its FILE or folder in the formats of other programs."""
-    from ringsim.export.paraview import write_pvd
-    from ringsim.export.tables import MANY, most_rows, write_csv, write_mat
+    from ringsim.export import MANY, most_rows, write_csv, write_mat, write_pvd
 
     with opened(file) as dataset:
         campaign = "sample" in dataset.dims

@@ -56,7 +56,7 @@ def accuracy_command(
 
     from ringsim.analysis.accuracy import tables
     from ringsim.analysis.study import evidence_of
-    from ringsim.campaign.accuracy import ReferenceRunError, run_ladder
+    from ringsim.campaign.studies import ReferenceRunError, run_ladder
     from ringsim.dataset import save
     from ringsim.plots.studies import accuracy
     from ringsim.plots.style import write
@@ -135,7 +135,7 @@ def stability_command(
 def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float) -> int:
     """Run panels, check some percent of the ok cells, and write the map; returns the exit code."""
     from ringsim.analysis.stability import WRONG, summary, to_markdown
-    from ringsim.campaign.stability import run_check, run_map
+    from ringsim.campaign.studies import run_check, run_map
     from ringsim.dataset import save
     from ringsim.plots import style
     from ringsim.plots.studies import stability

@@ -15,7 +15,7 @@ from ringsim.layout.layout import Contact, Hung
 from ringsim.layout.points import HUB
 from ringsim.parts.laws import HUB as FREE
 from ringsim.parts.laws import AngleLaw, PairLaw, Reaction, Rub, Switches
-from ringsim.parts.persection import at_section
+from ringsim.units import at_section
 
 # Lines that carry corners, and their trolleys, as objects on the corners' nodes.
 

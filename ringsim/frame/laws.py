@@ -12,8 +12,8 @@ from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Skeleton
 from ringsim.layout.bodies import Array, JointOpening
 from ringsim.parts.joints import JointFriction
 from ringsim.parts.laws import AngleLaw, Reaction, Rub, Switches
-from ringsim.parts.persection import at_section
 from ringsim.refusal import InputError
+from ringsim.units import at_section
 
 # Laws of ringsim.parts and ringsim.cable as lists of operations, which the core plays (laws.c).
 #

@@ -41,9 +41,9 @@ from ringsim.layout.layout import (
 )
 from ringsim.parts.boom import RigidBoom
 from ringsim.parts.laws import AngleLaw, Corners, PairLaw, Reaction, Rub
-from ringsim.parts.persection import spread
 from ringsim.parts.rods import Tube
 from ringsim.refusal import InputError
+from ringsim.units import spread
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene

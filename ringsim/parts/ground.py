@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from ringsim.parts.persection import PerSection
 from ringsim.units import (
     KilogramOrZero,
     ListIn,
     Model,
     Newton,
+    PerSection,
     PositiveSpeed,
     Second,
     SpringRate,

@@ -10,7 +10,6 @@ from pydantic import Field, model_validator
 
 from ringsim.choice import OneOf
 from ringsim.parts.laws import AngleLaw, AngleRecord, Reaction, one_sided, two_sided
-from ringsim.parts.persection import PerSection
 from ringsim.units import (
     AngularRate,
     DegreeOrZero,
@@ -18,6 +17,7 @@ from ringsim.units import (
     MetreOrZero,
     Model,
     Newton,
+    PerSection,
     Torque,
     TorsionDamping,
     TorsionRate,

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.parts.margin import Category
-from ringsim.parts.persection import at_section
-from ringsim.units import Model
+from ringsim.units import Model, at_section
 
 Array = NDArray[np.float64]
 Place = tuple[int, int]

@@ -15,8 +15,16 @@ from ringsim.parts.laws import (
     one_sided,
     two_sided,
 )
-from ringsim.parts.persection import PerSection, spread
-from ringsim.units import AxialStiffness, DampingRate, Kilogram, Metre, SpringRate, Unit
+from ringsim.units import (
+    AxialStiffness,
+    DampingRate,
+    Kilogram,
+    Metre,
+    PerSection,
+    SpringRate,
+    Unit,
+    spread,
+)
 
 # The family of nets.
 

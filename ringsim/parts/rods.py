@@ -5,16 +5,17 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ringsim.parts.persection import PerSection, spread
 from ringsim.units import (
     Density,
     Metre,
     MetreOrZero,
     Model,
     Pascal,
+    PerSection,
     PoissonRatio,
     SecondOrZero,
     Unit,
+    spread,
 )
 
 # Tubular cross-sections and their elastic and inertial constants.

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ringsim.parts.persection import PerSection
-from ringsim.units import ListIn, Model, Unit
+from ringsim.units import ListIn, Model, PerSection, Unit
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene

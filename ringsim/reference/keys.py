@@ -15,9 +15,8 @@ import annotated_types
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from ringsim.parts.persection import EACH
 from ringsim.refusal import models_in
-from ringsim.units import LEFT_OUT, Model, nested_in, unit_of
+from ringsim.units import EACH, LEFT_OUT, Model, nested_in, unit_of
 
 # What docstrings say of records and their fields.
 

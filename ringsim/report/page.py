@@ -1,4 +1,4 @@
-"""One page about a campaign, out of its merged file."""
+"""One page about a campaign, out of its merged file, or about how it differs from another."""
 
 import re
 import tomllib
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+from ringsim.analysis import comparison_text
 from ringsim.analysis.campaign_notes import override_lines, peak_lines, restart_lines
 from ringsim.analysis.design import campaign_file, endings, inputs, paths_of
 from ringsim.analysis.intervals import good
@@ -15,6 +16,7 @@ from ringsim.analysis.study_text import head_lines, outputs_in, sections
 from ringsim.analysis.worst import NOTE_ON_UNUSUAL
 from ringsim.files import write_text
 from ringsim.overrides import flat
+from ringsim.plots.comparison import figures_of_both
 from ringsim.plots.figures import figures_of
 from ringsim.refusal import show
 from ringsim.report import tables
@@ -153,3 +155,32 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
 
 def _turn(name: str) -> int:
     return _ANSWERS.index(name) if name in _ANSWERS else len(_ANSWERS)
+
+
+# How a campaign, or a run, differs from another.
+
+
+def write_comparison(found: xr.Dataset, first: xr.Dataset, second: xr.Dataset, out: Path) -> int:
+    """Write the page of what ``compare`` has found of two datasets; returns its size in bytes.
+
+    InputError if the file cannot be written.
+    """
+    text = comparison_page(found, first, second)
+    write_text(out, text)
+    return len(text.encode("utf-8"))
+
+
+def comparison_page(found: xr.Dataset, first: xr.Dataset, second: xr.Dataset) -> str:
+    """The page as text: nothing in it refers to another file or address."""
+    names, both = comparison_text.names_of(found), (first, second)
+    context = {
+        "title": f"What differs: {found.attrs['second_name']} against {found.attrs['first_name']}",
+        "notes_on_all": comparison_text.head_lines(found), "told": comparison_text.sections(found),
+        "names": {name: first[name].attrs.get("long_name", "")
+                  for name in comparison_text.differing(found)},
+        "sides": [
+            (name, str(each.attrs.get("campaign", "")), list(tables.provenance(each)))
+            for name, each in zip(names, both, strict=True)
+        ],
+    }  # fmt: skip
+    return written("compare.html.j2", context, list(figures_of_both(found, first, second)))

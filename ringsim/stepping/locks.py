@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ringsim.hermite import first_zero
 from ringsim.parts.laws import Switches
-from ringsim.parts.persection import spread
 from ringsim.stepping.instant import Array, Instant, Remembering
+from ringsim.units import spread
 from ringsim.variables import PLANES, Fate
 
 if TYPE_CHECKING:

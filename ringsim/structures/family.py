@@ -8,8 +8,7 @@ from pydantic import Field
 
 from ringsim.cable.records import points_of
 from ringsim.layout.layout import Layout
-from ringsim.parts.persection import PerSection
-from ringsim.units import Model, Unit
+from ringsim.units import Model, PerSection, Unit
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene

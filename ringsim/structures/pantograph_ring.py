@@ -13,10 +13,9 @@ from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import BodyRef, Draft, Track
 from ringsim.layout.layout import Layout
-from ringsim.parts.persection import PerSection, spread
 from ringsim.parts.rods import errors_of
 from ringsim.structures.family import HingeError, Structure
-from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
+from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, PerSection, Unit, spread
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene

@@ -15,8 +15,8 @@ from loops import for_each
 from ringsim.analysis.accuracy import NEEDED, tables
 from ringsim.analysis.engines import limit
 from ringsim.analysis.ladder import GRADED, ladder, left_out, references
-from ringsim.campaign import accuracy
-from ringsim.campaign.accuracy import ReferenceRunError, run_ladder
+from ringsim.campaign import studies
+from ringsim.campaign.studies import ReferenceRunError, run_ladder
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.variables import Status
@@ -58,7 +58,7 @@ def study(tmp_path, monkeypatch):
             found.assign_coords(sample=range(len(rows))).to_netcdf(tmp_path / f"{name}.nc")
             return tmp_path / f"{name}.nc"
 
-        monkeypatch.setattr(accuracy, "run_cases", run_cases)
+        monkeypatch.setattr(studies, "run_cases", run_cases)
         return run_ladder(tmp_path, SCENE, 1, 60.0, most, **how)
 
     return study

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringsim.campaign.accuracy import _quadrature
+from ringsim.campaign.studies import _quadrature
 from ringsim.scene import load_scene
 
 pytestmark = pytest.mark.quick

@@ -16,7 +16,7 @@ from ringsim.analysis.reweighting import read_distributions, weights_of
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.campaign.specification import load_campaign
-from ringsim.export.tables import meaning_of
+from ringsim.export import meaning_of
 from ringsim.plots.campaign.numbers import by_input
 from ringsim.plots.campaign.tornado import bars_of
 from ringsim.refusal import InputError

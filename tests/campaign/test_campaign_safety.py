@@ -17,7 +17,7 @@ import xarray as xr
 
 from campaign_bench import MODULES, Bench, comparable, journals, lose, opened, records
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.status import _left
+from ringsim.campaign.plan import _left
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ from click.testing import CliRunner
 from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_positions
 from scipy.io import loadmat
 
+import ringsim.export
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.export import tables
 from ringsim.shapes import COMPUTED, FROM_ANGLES, shape_of
 
 
@@ -68,7 +68,7 @@ def test_tables(
     file: Path, campaign: xr.Dataset, block: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same whether they are written at once or in blocks of samples."""
-    monkeypatch.setattr(tables, "BLOCK", block)
+    monkeypatch.setattr(ringsim.export, "BLOCK", block)
     printed = export(file.parent, "--out", file.parent / "tables")
     known = {Path(line.removeprefix("wrote ")).name for line in printed.splitlines()}
     assert known == {path.name for path in (file.parent / "tables").iterdir()}
@@ -118,9 +118,9 @@ def test_long_tables_are_told_before_they_are_written(
 ) -> None:
     rows = campaign["position"].size
     assert rows > campaign["opening_angle"].size
-    monkeypatch.setattr(tables, "MANY", rows - 1)
+    monkeypatch.setattr(ringsim.export, "MANY", rows - 1)
     assert f"the longest table has up to {rows:,} rows: choose variables" in export(file)
-    monkeypatch.setattr(tables, "MANY", rows)
+    monkeypatch.setattr(ringsim.export, "MANY", rows)
     assert "rows" not in export(file)
 
 
@@ -209,6 +209,6 @@ def test_what_cannot_be_exported_is_refused(
         ("LONGEST_NAME", 20, "and MATLAB's names at most 20"),
     ):
         with monkeypatch.context() as patched:
-            patched.setattr(tables, bound, most)
+            patched.setattr(ringsim.export, bound, most)
             assert told in export(file, "--format=mat", code=2)
     assert not list(file.parent.glob("*.mat"))

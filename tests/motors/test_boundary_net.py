@@ -19,13 +19,13 @@ from ringsim.layout.layout import layout_of
 from ringsim.parts.laws import Corners, PairLaw, Reaction, one_sided
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.parts.net import Net
-from ringsim.parts.persection import PerSection
 from ringsim.refusal import InputError
 from ringsim.rigid.margin import DriveMargin
 from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, load_scene
 from ringsim.shapes import shape_of
 from ringsim.simulation import simulate
+from ringsim.units import PerSection
 
 STIFFNESS, STRAIN = 2000.0, 0.01
 NET = {"kind": "boundary", "axial_stiffness": STIFFNESS, "strain": STRAIN}

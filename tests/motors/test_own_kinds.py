@@ -15,9 +15,9 @@ from ringsim.layout.layout import layout_of
 from ringsim.outputs.family import OUTPUTS, VARIABLES, Array, Output, Reading, Variable
 from ringsim.parts.joints import HingeSpring
 from ringsim.parts.laws import Reaction
-from ringsim.parts.persection import PerSection
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
+from ringsim.units import PerSection
 from ringsim.variables import Status
 
 APART = np.radians(60.0)

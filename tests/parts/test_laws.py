@@ -18,9 +18,8 @@ from ringsim.parts.faults import StuckVJoint
 from ringsim.parts.joints import JointFriction, Latch, SpringDamperStop, Stop
 from ringsim.parts.laws import PairRecord
 from ringsim.parts.net import BoundaryNet, SpringNet
-from ringsim.parts.persection import at_section
 from ringsim.structures.planar_truss import DeployingSpring, Rest
-from ringsim.units import Model
+from ringsim.units import Model, at_section
 
 FRICTION = st.deferred(lambda: any_kind(JointFriction))
 STOP = st.deferred(lambda: any_kind(Stop))

@@ -15,11 +15,10 @@ from ringsim.choice import kinds_of
 from ringsim.exudyn.build import build
 from ringsim.exudyn.integrate import Integration
 from ringsim.parts.joints import JointFriction
-from ringsim.parts.persection import PerSection
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene, scene_from_toml
 from ringsim.stepping.locks import lock_times
-from ringsim.units import AngularRate, Torque, unit_at
+from ringsim.units import AngularRate, PerSection, Torque, unit_at
 
 
 class StribeckFriction(JointFriction):

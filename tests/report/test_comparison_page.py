@@ -18,7 +18,7 @@ from ringsim.analysis.intervals import good
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots.comparison import figures_of_both, pairs, values
-from ringsim.report.comparison import page
+from ringsim.report.page import comparison_page
 from ringsim.report.shell import LARGEST
 
 
@@ -38,7 +38,7 @@ def test_the_page_holds_every_cell_of_the_terminal_and_loads_nothing(
     both: tuple[xr.Dataset, xr.Dataset],
 ) -> None:
     found = compare(*both, ("ground", "flight"))
-    text = page(found, *both)
+    text = comparison_page(found, *both)
     read = Page(text)
     assert len(text.encode()) < LARGEST
     assert len(read.ids) == len(set(read.ids))
@@ -137,7 +137,7 @@ def test_two_runs_are_drawn_over_time(both: tuple[xr.Dataset, xr.Dataset]) -> No
     angles = drawn["courses"].axes[0].lines[0]
     mean = one["opening_angle"].mean(["plane", "section"]).to_numpy()
     assert angles.get_ydata() == pytest.approx(mean[: len(angles.get_ydata())], nan_ok=True)
-    assert "figure-courses" in page(found, one, other)
+    assert "figure-courses" in comparison_page(found, one, other)
 
 
 def test_the_verb_writes_the_page_and_refuses_what_it_cannot_write(

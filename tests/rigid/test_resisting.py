@@ -7,9 +7,9 @@ import pytest
 
 from ringsim.layout.draft import FreeHub
 from ringsim.layout.layout import layout_of
-from ringsim.parts.persection import at_section
 from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.resistances import JointFrictionResistance, Opening
+from ringsim.units import at_section
 from small_rings import pulled
 
 pytestmark = pytest.mark.quick

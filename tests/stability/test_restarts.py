@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from ringsim import simulation
 from ringsim.analysis.campaign_notes import restart_lines
-from ringsim.campaign import accuracy
+from ringsim.campaign import studies
 from ringsim.cli import cli
 from ringsim.dataset import to_dataset
 from ringsim.exudyn import integrate
@@ -153,10 +153,10 @@ def test_a_rung_of_an_accuracy_study_never_starts_anew(monkeypatch, tmp_path) ->
         asked.append((scene, cases))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(accuracy, "run_cases", refuse)
+    monkeypatch.setattr(studies, "run_cases", refuse)
     scene = SCENE.with_values({"solver.restarts": 5})
     with pytest.raises(KeyboardInterrupt):
-        accuracy.run_ladder(tmp_path, scene, workers=1, timeout=60.0)
+        studies.run_ladder(tmp_path, scene, workers=1, timeout=60.0)
     ((varied, cases),) = asked
     assert varied.solver.restarts == 0
     assert not any("solver.restarts" in case for case in cases)

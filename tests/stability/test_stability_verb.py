@@ -13,7 +13,7 @@ from loops import for_each
 
 from ringsim.analysis.stability import ENDED, OK
 from ringsim.campaign.panels import Panel, by_engines, panels_over, sweep_of
-from ringsim.campaign.stability import _pieces
+from ringsim.campaign.studies import _pieces
 from ringsim.cli import cli
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
