@@ -191,6 +191,7 @@ def test_a_scene_that_cannot_be_refined_is_refused(study):
 
 def test_reports_begin_anew_with_another_engine(tmp_path, monkeypatch):
     file = Path(__file__).parents[2] / "benchmarks" / "accuracy_reports.py"
+    monkeypatch.syspath_prepend(file.parent)
     spec = importlib.util.spec_from_file_location("accuracy_reports", file)
     reports = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(reports)
