@@ -80,10 +80,15 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
         for remark in str(reasons[sample]).split("; ")[1:]:
             kind = _NUMBER.sub("#", _PLACES.sub("#", remark))
             found.setdefault(kind, []).append((sample, remark))
+    every = int(held.sum())
     return [
-        f"remark of {len(own)} of {int(held.sum())} samples: {own[0][1]} (sample {own[0][0]})"
+        f"{_where(len(own), every)}, as sample {own[0][0]} tells: {own[0][1]}"
         for own in sorted(found.values(), key=len, reverse=True)
     ]
+
+
+def _where(count: int, every: int) -> str:
+    return f"in all {every} samples" if count == every > 1 else f"in {count} of {every} samples"
 
 
 def override_lines(campaign: xr.Dataset) -> list[str]:

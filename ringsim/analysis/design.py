@@ -154,8 +154,9 @@ class Placement:
             )
         if self.independent:
             return (
-                "intervals of 95 %: bootstrap of means and standard deviations (of less where "
-                "tails are long), order statistics of quantiles, Clopper-Pearson of shares"
+                "intervals of 95 %: bootstrap of means and standard deviations (with smaller "
+                "resamples where tails are long), order statistics of quantiles, Clopper-Pearson "
+                "of shares"
             )
         of = "the samples A and B of its blocks alone stand for the population: " * (self.block > 1)
         if self.replicates > 1:

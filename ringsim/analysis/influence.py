@@ -19,7 +19,7 @@ from ringsim.stepping.instant import Array
 from ringsim.tables import counted
 from ringsim.variables import about
 
-# Pairs of inputs that go together, so that the effect of one may be told as the other's.
+# Pairs of inputs that go together, so that the effect of one may be taken for the other's.
 
 
 _NAMED = 3
@@ -130,7 +130,7 @@ def confounding_notes(analysis: xr.Dataset, told: Collection[str]) -> list[str]:
     return [
         "inputs are not independent in these samples, which chance does not explain (share of the "
         f"variance of one that the other explains, rank correlation): {named}{more}; the effect of "
-        "one may be told as the other's: draw more samples, or a design of kind random"
+        "one may be taken for the other's: draw more samples, or a design of kind random"
     ]
 
 

@@ -18,6 +18,8 @@ from ringsim.tables import Table, chance_text, counted, interval_text, number_te
 # Every measure: the largest rank correlations, indices and areas of each output.
 
 
+_ALONE = 0.999
+"""Rank correlation from which on what is left of the ranks tells nothing of the other inputs."""
 _NAMED = {False: 5, True: 3}
 """Inputs that are told for each output and group, and single places of such that have many."""
 
@@ -56,9 +58,11 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         ]  # fmt: skip
         if np.isnan(partial[0][chosen]).any():
             alike = [str(names[k]) for k in chosen if np.isnan(plain[0][k])]
-            why = f"{alike[0]} is the same in all samples used" if alike else (
+            alone = np.nanmax(np.abs(plain[0][chosen])) > _ALONE
+            why = "one input decides its ranks" if alone else (
                 "they are too few, or inputs depend on each other"
             )  # fmt: skip
+            why = f"{alike[0]} is the same in all samples used" if alike else why
             lacking.append(f"{output} ({used} samples used: {why})")
     if lacking:
         notes.append(f"no partial correlation, which holds the other inputs: {', '.join(lacking)}")

@@ -60,7 +60,8 @@ class Requirement(Model):
     probability: Annotated[float, Field(gt=0.0, lt=1.0)]
     """Share of all antennas, at least, that must keep to it."""
     confidence: Annotated[float, Field(ge=0.5, lt=1.0)]
-    """Probability, at least, with which an antenna that does not keep to it is found out."""
+    """Of either bound of the probability: so often, at least, samples of a design that falls short
+    of it are not judged as met."""
 
     @property
     def given(self) -> list[tuple[Kind, Any]]:

@@ -136,7 +136,7 @@ _MEANING = {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in
     "reason": ("", "why the run ended so"),
     "cause": ("", "the reason in a word"),
     "verdict": ("", "ok, ended with a cause, or wrong"),
-    "check": ("", "whether a finer run held what ok promises"),
+    "check": ("", "whether a finer run agreed to within what ok stands for"),
     "final_angle": ("degree", "mean opening angle at the last output time"),
     "time_difference": ("1", "change of the deployment time in a finer run, over itself"),
     "angle_difference": ("degree", "change of the mean opening angle in a finer run"),
@@ -286,7 +286,8 @@ def _checks(whole: xr.Dataset) -> list[str]:
     time, angle, tension = PROMISES.values()
     text = (
         f"{count.total() - count['']} random ok cells were run again with a quarter of the step "
-        f"and a sixteenth of the tolerance: {count['holds']} held what ok promises "
+        f"and a sixteenth of the tolerance: {count['holds']} agreed to within "
+        "what ok stands for "
         f"({100 * time:g} % of the deployment time, {angle:g} deg of the mean angle of runs "
         f"that end before, {100 * tension:g} % of the largest tension), {count['differs']} did "
         f"not, {count['unproven']} stayed unproven because the finer run did not end or was hardly "

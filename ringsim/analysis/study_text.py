@@ -228,7 +228,7 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
         found = judge(population_of(campaign), required_by(campaign.attrs), placed)
     except InputError as error:
         return [*lines, f"the requirements cannot be judged: {error}"]
-    return [*lines, *verdict_table(found.assign_attrs({NOTE: lost.note})).lines()]
+    return [*lines, *slim(verdict_table(found.assign_attrs({NOTE: lost.note}))).lines()]
 
 
 def not_met(analysis: xr.Dataset) -> list[str]:
@@ -278,8 +278,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             held = one["samples_used"] - one["samples_violating"]
             hint = "" if OUTCOME in analysis["requirement"] else _HINT
             notes.append(
-                f"{name}: {short} of the {held} that keep to it ended short of their goal, and "
-                f"might not have kept to it further on{hint}"
+                f"{name}: {short} of the {held} that keep to it ended short of their goal: had "
+                f"they gone on, they might have violated it{hint}"
             )
         if missing := one["samples_without_value"]:
             notes.append(
@@ -355,9 +355,8 @@ def too_few() -> str:
         next(n for n in range(2, 1000) if ranks(n, level)) for level in (0.5, 0.05)
     )
     return (
-        f"no interval of what fewer than {LEAST_OF_BOOTSTRAP} samples tell: that of a mean or a "
-        f"standard deviation takes {LEAST_OF_BOOTSTRAP}, of a median {of_median}, of the other "
-        f"quantiles {of_others}"
+        f"too few samples for some intervals: a mean or a standard deviation takes "
+        f"{LEAST_OF_BOOTSTRAP}, a median {of_median}, the other quantiles {of_others}"
     )
 
 

@@ -246,7 +246,7 @@ _MEANING = {
     "probability": ("share of the samples used that keep to the requirement", "f8"),
     "probability_lower": ("one-sided lower bound of the probability, lost samples violating", "f8"),
     "probability_upper": ("one-sided upper bound of the probability, lost samples keeping", "f8"),
-    "samples_used": ("samples with numbers that hold", "i8"),
+    "samples_used": ("samples whose runs are sound", "i8"),
     "samples_lost": ("samples whose run failed", "i8"),
     "samples_violating": ("samples used that violate the requirement", "i8"),
     "samples_without_value": ("of these, samples without a value", "i8"),

@@ -6,7 +6,7 @@ import contextlib
 import json
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.analysis.design import MERGED, placement_of
 from ringsim.analysis.influence import pairs
+from ringsim.analysis.intervals import samples_needed
+from ringsim.analysis.requirements import Requirement
 from ringsim.campaign.folder import Folder, digests, opened_as
 from ringsim.campaign.run import Order, grown, growth_told
 from ringsim.campaign.stopping import End, decided, looks_of
@@ -71,6 +73,8 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
         lines.append(f"  statistics     {placed.told}")
     if placed.population and not campaign.specification.correlations:
         lines += _confounded(table)
+    if placed.population:
+        lines += _out_of_reach(campaign.specification.requirements, table.samples)
     if rule := campaign.specification.rule:
         numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
         looks = ", ".join(map(str, numbers)) or "none before the last sample"
@@ -154,6 +158,20 @@ def _predicted(
     return each, [f"{each.mean():.3g} s each{spread}, {basis}"], size
 
 
+def _out_of_reach(requirements: Mapping[str, Requirement], samples: int) -> list[str]:
+    """Lines on requirements that so many samples cannot show, however well all of them do."""
+    lines = []
+    for name, wanted in requirements.items():
+        needed = samples_needed(0, wanted.probability, wanted.confidence)
+        if needed > samples:
+            lines.append(
+                f"  requirement    {name}: {samples} samples cannot show a probability of "
+                f"{wanted.probability:g} with a confidence of {wanted.confidence:g}, {needed} "
+                "without a violation would"
+            )
+    return lines
+
+
 def _confounded(table: Table) -> list[str]:
     """A line if inputs go together, as points of a design do that are few for its dimensions."""
     found: dict[bytes, tuple[str, Array]] = {}
@@ -179,7 +197,7 @@ def _confounded(table: Table) -> list[str]:
     both = f"{names[first.first]} and {names[first.second]}"
     return [
         f"  inputs         {both} have a rank correlation of {first.correlation:+.2f} in these "
-        f"samples{others}: the effect of one may be told as the "
+        f"samples{others}: the effect of one may be taken for the "
         'other\'s; draw more samples for each replicate, or with design.kind = "random"'
     ]
 

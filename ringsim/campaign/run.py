@@ -88,6 +88,8 @@ class Choices:
     """Settings by scene path with which those run, and nothing else does."""
     more: bool = False
     """Whether more samples may follow: then nothing is merged or told as long as all goes well."""
+    brief: bool = False
+    """Whether nothing is told of the results: what asked for them tells what they mean."""
 
 
 def run_campaign(folder: Path, choices: Choices) -> int:
@@ -227,8 +229,8 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
         _tell(f"{path}: {campaign.table.samples} samples, {failed} failed")
         listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
         with xr.open_dataset(path) as dataset:
-            lines = notes(dataset)
-            if listed or campaign.scene.solver.error_bars:
+            lines = [] if choices.brief else notes(dataset)
+            if not choices.brief and (listed or campaign.scene.solver.error_bars):
                 lines += error_lines(dataset)
             lines += check_lines(dataset) + verdict_lines(dataset)
             refused = too_far(dataset)
@@ -501,7 +503,7 @@ def run_cases(
         prepare_folder(campaign, folder / name, solver=SOLVERS[fidelity])
     for each, text in texts.items():
         write_text(folder / each, text)
-    choices = Choices(Local(workers), campaign.specification.limits, again=again)
+    choices = Choices(Local(workers), campaign.specification.limits, again=again, brief=True)
     if run_campaign(folder / name, choices) == EXIT_INTERRUPTED:
         raise KeyboardInterrupt
     return folder / name / MERGED

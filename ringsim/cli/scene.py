@@ -22,7 +22,15 @@ from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.rigid.drive import turns_ever
-from ringsim.rigid.margin import MOST, DriveMargin, Margin, PlaneMargin
+from ringsim.rigid.margin import (
+    GEARS,
+    MOST,
+    PULLEYS,
+    DriveMargin,
+    Margin,
+    PlaneMargin,
+    place_of_winch,
+)
 from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
 from ringsim.scene.substituted import strained, substituted
 from ringsim.tables import counted, text_table
@@ -259,47 +267,58 @@ def margin_lines(scene: Scene) -> Iterator[str]:
         k for now in first for k, force in now.driving.items() if force > 0.0
     )
     sources = list(known_sources) if len(known_sources) > 1 else []
+    # Of one standard all that its margin is made of has room beside it.
+    whole = list(courses.values()) if len(courses) == 1 else []
     yield "Forces on the opening angle in N m, without factors; margins with those of the standard."
     rows = [
         [
             f"{math.degrees(now.angle):.1f}",
             *(
-                f"{force:.4g}"
+                _force(force, now)
                 for force in (
                     now.available,
                     *(now.driving.get(k, 0.0) for k in sources),
                     *(now.resisting[k] for k in kinds),
                 )
             ),
+            *(_force(f, now) for c in whole for f in (c[row].counted, c[row].required)),
             *(_told(course[row].margin) for course in courses.values()),
         ]
         for row, now in enumerate(first)
     ]
     of_it = [f"by {source}" for source in sources]
-    yield from text_table(["angle (deg)", "drive", *of_it, *kinds, *drives], rows)
+    own = ["counted drive", "required"] if whole else []
+    margins = ["margin"] if whole else [*drives]
+    yield from text_table(["angle (deg)", "drive", *of_it, *kinds, *own, *margins], rows)
     for name, drive in drives.items():
-        yield f"{name}: margin = {_formula(drive, kinds)}"
-    if "pulley friction" in kinds:
-        yield (
-            "each margin has tensions of its own, found with the friction of pulleys and gears "
-            "times the standard's factor: it is not the forces above times these factors"
-        )
+        yield from _formula(name, drive, kinds)
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least())}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
 
 
-def _formula(drive: DriveMargin, kinds: list[str]) -> str:
+def _formula(name: str, drive: DriveMargin, kinds: list[str]) -> Iterator[str]:
     """The standard's factors in words, of what resists anywhere."""
-    standard = drive.standard
+    standard, lossy = drive.standard, (PULLEYS, GEARS)
     resisting = " + ".join(
-        f"{factor:g} {kind}" for kind, factor in drive.factors.items() if kind in kinds
-    )
-    springs = any(one in drive.factors for one in ("springs", "net", "lines"))
-    driving = f", springs times {standard.driving_spring:g}" if springs else ""
+        f"{factor:g} {kind}" for kind, factor in drive.factors.items()
+        if kind in kinds and kind not in lossy
+    )  # fmt: skip
     speed = f" + {standard.inertia:g} inertia" if standard.keep_speed else ""
-    return f"drive{driving} / ({standard.motorisation:g} x ({resisting}){speed}) - 1"
+    needed = f"{standard.motorisation:g} x ({resisting or 0}){speed}"
+    yield f"{name}: margin = counted drive / required - 1, required = {needed}"
+    parts = [f"cables with {standard.friction:g} times the friction of pulleys and gears"]
+    parts = parts if any(kind in drive.factors for kind in lossy) else ["all that drives"]
+    if any(one in drive.factors for one in ("springs", "net", "lines")):
+        parts.append(f"springs that drive times {standard.driving_spring:g}")
+    yield f"  counted drive: {', '.join(parts)}"
+
+
+def _force(force: float, now: Margin) -> str:
+    """A force in N m; what is round-off beside the others is none."""
+    largest = max(now.available, *map(abs, now.resisting.values()), 0.0)
+    return f"{0.0 if abs(force) < 1e-9 * largest else force:.4g}" if math.isfinite(force) else "-"
 
 
 def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
@@ -309,9 +328,8 @@ def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
         if fault.time > AT_ONCE and words == "counted":
             words = "strikes later, not counted here; a run counts it from then on"
         yield f"faults[{number}], {kind_of(fault)} at {fault.time:g} s: {words}"
-    names = [] if scene.cables is None else [number for number, _ in scene.cables.present()]
-    for (cable, end), winch in drive.conditions.winches.items():
-        place = f"cables.{scene.structure.planes[names[cable]]}.{('winch', 'far_winch')[end]}"
+    for where, winch in drive.conditions.winches.items():
+        place = place_of_winch(scene, *where)
         if not turns_ever(winch):
             yield f"{place}: never turns, not counted"
             continue
@@ -328,14 +346,17 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
         return
     struck = any(hasattr(one, "cable") and one.time <= AT_ONCE for one in scene.faults)
     if cables.upper == cables.lower and not struck:
-        yield "both planes drive alike: each gives half of it"
+        yield "both planes drive alike: each gives half of the drive"
         return
     for number, plane in enumerate(scene.structure.planes):
         drive = PlaneMargin(scene, standard, number)
         least = drive.least()
         whole = drive.whole(least.angle).available
         share = f"{100.0 * least.available / whole:.3g}" if whole > 0.0 else "0"
-        yield f"{plane}: {share} % of the drive against half of all that resists: {_verdict(least)}"
+        yield (
+            f"{plane} cable alone: gives {share} % of the drive and must overcome half of what "
+            f"resists: {_verdict(least)}"
+        )
 
 
 def _told(margin: float) -> str:

@@ -114,9 +114,9 @@ def unresolved(run: Run) -> str:
     if longest[k] <= period / STEPS:
         return ""
     return (
-        f"; steps of {1e3 * longest[k]:.3g} ms at the lock at {locks[k]:.6g} s pass over shocks in "
-        f"the rods (period {1e3 * period:.3g} ms): for peaks at base and corners reduce "
-        f"{_cure(run)}"
+        f"; steps of {1e3 * longest[k]:.3g} ms at the lock at {locks[k]:.6g} s are too long for "
+        f"shocks in the rods (period {1e3 * period:.3g} ms), so that peaks of base loads and of "
+        f"corner accelerations may come out too low: reduce {_cure(run)}"
     )
 
 

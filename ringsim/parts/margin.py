@@ -71,15 +71,16 @@ class EcssMechanisms(MarginStandard):
 
     kind: Literal["ecss-e-st-33-01c"] = "ecss-e-st-33-01c"
     inertia: Factor = 1.25
-    """F_D of the clause."""
+    """F_D of the clause, the inertia of a motion that is asked for; its I, of parts in an
+    accelerated frame, has no model."""
     spring: Factor = 1.2
     friction: Factor = 3.0
     """1.5 for friction that was measured on the part in its environment; gears with it."""
     gravity: Factor = 1.1
     """Inferred: the clause is for flight; weight is known as well as inertia is."""
     load: Factor = 1.1
-    """Inferred: the clause has no such line on the resisting side; a prescribed force is known as
-    well as inertia is."""
+    """Inferred: F_L of the clause is a force to be delivered, and none is; a prescribed force that
+    folds the ring has no line there, and is known as well as inertia is."""
     latch: Factor = 3.0
     """Inferred: taken like friction."""
     driving_spring: Factor = 0.8

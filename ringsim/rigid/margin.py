@@ -13,7 +13,7 @@ from ringsim.layout.bodies import Array
 from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.refusal import InputError
-from ringsim.rigid.drive import Drive
+from ringsim.rigid.drive import Drive, turns_ever
 from ringsim.rigid.mechanism import Mechanism, SectionLoads
 from ringsim.rigid.resistances import Opening, resistances
 from ringsim.scene import Scene
@@ -61,6 +61,11 @@ class Margin(NamedTuple):
     def available(self) -> float:
         """Sum of all that drives, N m."""
         return sum(self.driving.values())
+
+    @property
+    def counted(self) -> float:
+        """What drives as the standard counts it, N m; NaN where nothing resists."""
+        return (1.0 + self.margin) * self.required if self.required > 0.0 else math.nan
 
 
 class DriveMargin:
@@ -170,6 +175,25 @@ class DriveMargin:
         return angles
 
 
+def place_of_winch(scene: Scene, cable: int, end: int) -> str:
+    """The path of the winch at an end (0 first, 1 far) of the present cable of this number."""
+    assert scene.cables is not None
+    plane = [number for number, _ in scene.cables.present()][cable]
+    return f"cables.{scene.structure.planes[plane]}.{('winch', 'far_winch')[end]}"
+
+
+def _still_off(scene: Scene, drive: DriveMargin, time: float) -> str:
+    """What a reason says of winches that start after the time (s) of the least margin."""
+    late = [
+        f"{place_of_winch(scene, *where)} starts at {winch.start_time:g} s"
+        for where, winch in drive.conditions.winches.items()
+        if turns_ever(winch) and time < winch.start_time - AT_ONCE
+    ]
+    return f"; the least drive margin is that of {time:.4g} s, before {' and '.join(late)}" * bool(
+        late
+    )
+
+
 def _margin(drive: float, required: float) -> float:
     """-1 where nothing drives, or the ring is held."""
     if required > 0.0:
@@ -259,7 +283,8 @@ def with_margin(
     lock = float(outcome.values.get("deployment_time", math.nan))
     way = passed(times, outcome.values["opening_angle"], lock)
     drives = [(until, _drive(substituted(one), scene.margin)) for until, one in before]
-    drives.append((math.inf, DriveMargin(scene, scene.margin)))
+    last = DriveMargin(scene, scene.margin)
+    drives.append((math.inf, last))
     kinds = list(dict.fromkeys(kind for _, drive in drives if drive for kind in drive.kinds))
     available, margin = np.full((2, len(times)), np.nan)
     resisting = np.full((len(kinds), len(times)), np.nan)
@@ -278,8 +303,10 @@ def with_margin(
             leasts.append(least_along(drive, way.between(begin, until), known))
         begin = until
     values = {"drive_available": available, "drive_resistance": resisting, "drive_margin": margin}
+    reason = outcome.reason
     if leasts:
         least = min(leasts)
+        reason += _still_off(scene, last, least.time)
         values |= {
             "least_drive_margin": np.asarray(least.margin),
             "least_drive_margin_time": np.asarray(least.time),
@@ -287,6 +314,7 @@ def with_margin(
         }
     return replace(
         outcome,
+        reason=reason,
         values=outcome.values | values,
         coordinates=outcome.coordinates | {"resistance": np.array(kinds, dtype=str)},
     )

@@ -174,8 +174,8 @@ class Scene(Model):
 
         See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``; k may be the name of a
         pulley: ``coefficient["section 6 V"]``.  A table takes the place of the whole part; a new
-        ``kind`` keeps the fields that it has, and those given here.  InputError if a path or a
-        value is refused.
+        ``kind`` keeps the fields that it has, and those given here; what had the default of the old
+        kind has that of the new one.  InputError if a path or a value is refused.
 
         >>> scene = load_scene("ring18").with_values({"loads.force": 0.02, "boom": "none"})
         >>> scene.loads.force, scene.boom
@@ -190,9 +190,10 @@ class Scene(Model):
         for path, value in ((path, copy.deepcopy(value)) for path, value in ordered):
             if _tells_end(path):
                 _refuse_renumbering(table, path, value, values)
+            before = at_path(table, path)
             set_path(table, path, value)
             if path.endswith(".kind"):
-                _take_kind(table, path.removesuffix(".kind"), values)
+                _take_kind(table, path.removesuffix(".kind"), before, values)
         return scene_from_table(table, source=f"scene {self.name}")
 
     def to_table(self) -> dict[str, Any]:
@@ -232,18 +233,26 @@ def _refuse_renumbering(
         )
 
 
-def _take_kind(table: dict[str, Any], path: str, given: Mapping[str, Any]) -> None:
-    """Leave out what the part at ``path`` had and its kind has not, unless it is given, too."""
+def _take_kind(table: dict[str, Any], path: str, before: Any, given: Mapping[str, Any]) -> None:
+    """Leave out what the part at ``path`` had and its kind has not, and what it had by default of
+    the kind ``before``, unless it is given, too.
+    """
     inside: list[type[BaseModel]] = [Scene]
     for step in path.split("."):
         fields = [m.model_fields[step] for m in inside if step in m.model_fields]
         inside = [model for field in fields for model in models_in(field.annotation)]
     part = at_path(table, path)
-    for kind in inside:
-        if "kind" in kind.model_fields and kind.model_fields["kind"].default == part.get("kind"):
-            for name in part.keys() - kind.model_fields.keys():
-                if f"{path}.{name}" not in given:
-                    del part[name]
+    kinds = [(m.model_fields["kind"].default, m) for m in inside if "kind" in m.model_fields]
+    kind, old = (
+        next((m for k, m in kinds if k == word), None) for word in (part.get("kind"), before)
+    )
+    if kind is None:
+        return
+    for name in part.keys() - {"kind"}:
+        known = None if old is None or old is kind else old.model_fields.get(name)
+        by_default = known is not None and not known.is_required() and part[name] == known.default
+        if (by_default or name not in kind.model_fields) and f"{path}.{name}" not in given:
+            del part[name]
 
 
 def _lists(record: Model, prefix: str = "") -> Iterator[tuple[str, tuple[float, ...]]]:

@@ -36,7 +36,7 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     """Alike but for numbers and places; failed runs have reasons, and no remarks that count."""
     made = made_campaign(12, failed=(4,))
     reached = "all V-joints have reached 180 deg"
-    steps = "steps of {} ms at the lock at {} s pass over shocks in the rods (period 1 ms)"
+    steps = "steps of {} ms at the lock at {} s are too long for shocks in the rods (period 1 ms)"
     latch = "whether the latch of {} catches is uncertain, as another joint locked in the same step"
     reasons = [reached] * 12
     for sample, numbers in {1: (2.5, 9.1), 4: (1.0, 9.2), 7: (1.2e-3, 30.25), 9: (3, 9)}.items():
@@ -46,8 +46,10 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     reasons[11] += "; " + latch.format("upper 2, 4")
     made["reason"] = "sample", np.array(reasons, dtype=object)
     first, second = remark_lines(made)
-    assert first == f"remark of 3 of 11 samples: {steps.format(2.5, 9.1)} (sample 1)"
-    assert second.startswith("remark of 3 of 11 samples: whether the latch of upper 3, lower 5 and")
+    assert first == f"in 3 of 11 samples, as sample 1 tells: {steps.format(2.5, 9.1)}"
+    assert second.startswith("in 3 of 11 samples, as sample 9 tells: whether the latch of upper 3")
     lines = "\n".join(all_told(analyse(made)))
     assert " ".join(first.split()) in " ".join(lines.split())
     assert remark_lines(made_campaign(3)) == []
+    made["reason"] = "sample", np.array([f"{reached}; {latch}"] * 12, dtype=object)
+    assert remark_lines(made) == [f"in all 11 samples, as sample 0 tells: {latch}"]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from made_campaign import made_campaign
 from scipy.special import expit, logit
 from scipy.stats import norm, spearmanr
 
 from made import campaign, points
 from ringsim.analysis import indices
 from ringsim.analysis.design import drawn
+from ringsim.analysis.influence_text import influence_tables
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.variables import Fate, Status
@@ -37,6 +39,15 @@ def test_rank_correlations_are_those_of_scipy():
     expected = [spearmanr(column, output).statistic for column in columns.T]
     found = indices.correlations(indices.centred_ranks(columns), output)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_one_input_that_decides_the_ranks_is_told_as_the_cause():
+    random = np.random.default_rng(5)
+    made = with_inputs(made_campaign(60), a=random.random(60), b=random.random(60))
+    made["peak_tension"][:] = 10.0 + made["a"].to_numpy() ** 3
+    notes = [note for table in influence_tables(analyse(made)) for note in table.notes]
+    (note,) = (each for each in notes if "no partial correlation" in each)
+    assert "peak_tension (60 samples used: one input decides its ranks)" in note
 
 
 def test_partial_correlations_are_those_of_residuals():

@@ -156,6 +156,15 @@ def test_dry_run_says_where_there_will_be_no_intervals_and_no_range_of_one(bench
     assert "give design.replicates = 8" in bench.run(*start)
 
 
+def test_dry_run_says_which_requirement_so_many_samples_cannot_show(bench):
+    """21 samples without a violation have the bound 0.1 ** (1 / 21) = 0.896, 22 have 0.901."""
+    more = "[requirements]\nasynchrony_max = { max = 10.0, probability = 0.9, confidence = 0.9 }"
+    for samples, told in ((21, True), (22, False)):
+        printed = bench.run("campaign", bench.write(samples, more=more), "--dry-run", "--out", "o")
+        assert (f"asynchrony_max: {samples} samples cannot show" in printed) == told
+        assert ("0.9, 22 without a violation would" in printed) == told
+
+
 def test_dry_run_says_where_the_design_makes_inputs_go_together(bench):
     """111 inputs: 100 points a replicate are few, 512 are enough."""
     file = bench.folder / "friction.toml"

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from motor_rings import ring
 from ringsim.cli import cli
-from ringsim.parts.margin import EcssMechanisms
+from ringsim.parts.margin import EcssMechanisms, NasaMechanisms
 from ringsim.plots import figures
 from ringsim.plots.drives_and_locks import drive
 from ringsim.rigid.margin import DriveMargin
@@ -48,14 +48,64 @@ def test_check_prints_the_margin_of_the_ideal_ring(scene: Scene, tmp_path: Path)
     assert re.search(r"^nasa-std-5017b: least", both, re.M)
 
 
+def test_the_printed_formula_gives_the_printed_margin(scene: Scene, tmp_path: Path) -> None:
+    """Factors of the line below the table, forces of its rows."""
+    sprung = scene.with_values(
+        {"hinge_spring": {"kind": "linear", "stiffness": 0.01, "preload": 0.02}}
+    )
+    text = told(tmp_path / "one.toml", sprung)
+    head = re.split(r"  +", next(line for line in text.splitlines() if line.startswith("angle")))
+    formula = re.search(r"required = ([\d.]+) x \((.*)\)$", text, re.M)
+    assert formula is not None
+    factors = {
+        kind: float(factor)
+        for factor, kind in (term.split(" ", 1) for term in formula[2].split(" + "))
+    }
+    assert factors == {"joint friction": 3.0, "net": 1.2}
+    rows = [re.split(r"  +", line) for line in text.splitlines() if re.match(r"\d+\.\d  ", line)]
+    assert len(rows) > 12
+    for row in rows[:-1]:
+        own = dict(zip(head, row, strict=True))
+        required = float(formula[1]) * sum(f * float(own[kind]) for kind, f in factors.items())
+        assert float(own["required"]) == pytest.approx(required, rel=1e-3)
+        margin = float(own["counted drive"]) / float(own["required"]) - 1.0
+        assert float(own["margin"]) == pytest.approx(margin, abs=2e-3 * (1.0 + abs(margin)))
+    assert (
+        "cables with 3 times the friction of pulleys and gears, springs that drive times 0.8"
+        in text
+    )
+
+
+def test_another_standard_has_its_own_factors_and_keeps_those_that_were_given(
+    scene: Scene,
+) -> None:
+    other = scene.with_values({"margin.kind": "nasa-std-5017b"})
+    assert other.margin == NasaMechanisms()
+    measured = scene.with_values({"margin.friction": 1.5})
+    other = measured.with_values({"margin.kind": "nasa-std-5017b", "margin.latch": 3.0})
+    assert other.margin == NasaMechanisms(friction=1.5, latch=3.0)
+    both = {"margin.kind": "nasa-std-5017b", "margin.motorisation": 2.0}
+    assert scene.with_values(both).margin == NasaMechanisms(motorisation=2.0)
+
+
+def test_a_run_says_that_its_least_margin_waits_for_a_winch(scene: Scene) -> None:
+    run = simulate(scene.with_values({"cables.lower.winch.start_time": 0.25}), fidelity="frame")
+    words = "the least drive margin is that of 0 s, before cables.lower.winch starts at 0.25 s"
+    assert words in run.attrs["reason"]
+    assert float(run.least_drive_margin_time) == 0.0
+    assert "least drive margin" not in simulate(scene, fidelity="frame").attrs["reason"]
+
+
 def test_a_dead_winch_is_told_beside_a_strong_one(scene: Scene, tmp_path: Path) -> None:
     torques = {"upper": 1.0, "lower": 1e-9}
     values = {f"cables.{name}.winch.winding.stall_torque": t for name, t in torques.items()}
     text = told(tmp_path / "two.toml", scene.with_values(values))
     assert re.search(r"^ecss-e-st-33-01c: least margin \S+ at \S+ deg: enough$", text, re.M)
-    assert re.search(r"^  upper: 100 % of the drive .* deg: enough$", text, re.M)
+    assert re.search(r"^  upper cable alone: gives 100 % of the drive .* deg: enough$", text, re.M)
     assert re.search(
-        r"^  lower: 1e-07 % .* least margin -1.000 at \S+ deg: NOT enough$", text, re.M
+        r"^  lower cable alone: gives 1e-07 % .* least margin -1.000 at \S+ deg: NOT enough$",
+        text,
+        re.M,
     )
     assert "both planes drive alike" in told(tmp_path / "even.toml", scene)
 

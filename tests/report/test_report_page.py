@@ -415,7 +415,9 @@ def test_numerical_truth_tells_error_bars_and_differences_of_engines() -> None:
 def test_few_samples_are_told_why_there_is_no_interval() -> None:
     for count, few in ((7, True), (8, False)):
         notes = statistics_table(analyse(made_campaign(count))).notes
-        assert any("takes 8, of a median 6, of the other quantiles 59" in n for n in notes) == few
+        assert (
+            any("deviation takes 8, a median 6, the other quantiles 59" in n for n in notes) == few
+        )
 
 
 @pytest.mark.usefixtures("_undrawn")

@@ -237,6 +237,8 @@ class Saltelli(Grouped, Replicated):
     """
 
     kind: Literal["saltelli"] = "saltelli"
+    samples: Samples
+    """Number N of base samples, a multiple of ``replicates``; runs are g + 2 times as many."""
     replicates: Annotated[int, Field(ge=1, le=10_000)] = 8
     second_order: bool = False
     """Whether interactions of pairs of groups are wanted, too: nearly twice the runs."""
