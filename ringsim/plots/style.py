@@ -134,16 +134,25 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
+_FIXED = "\u00a0"
+"""A blank at which no line is broken."""
+
+
 def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> str:
-    """Meaning and unit of a variable, as on an axis: "Time since the start of the run (s)".
+    r"""Meaning and unit of a variable, as on an axis: "Time since the start of the run (s)".
 
     ``units`` replaces the variable's own where its values were scaled; lines longer than
-    ``width`` characters are broken.
+    ``width`` characters are broken, never within the unit.
+
+    >>> impulse = xr.DataArray(0.0, attrs={"long_name": "impulse of the stop", "units": "N m s"})
+    >>> label(impulse, width=24)
+    'Impulse of the stop\n(N m s)'
     """
     words = str(variable.attrs.get("long_name", variable.name))
     units = str(variable.attrs.get("units", "1")) if units is None else units
     words = words[:1].upper() + words[1:]
-    return textwrap.fill(unit_behind(words, units), width)
+    held = unit_behind(words, units.replace(" ", _FIXED))
+    return textwrap.fill(held, width).replace(_FIXED, " ")
 
 
 def readable_units(*variables: xr.DataArray) -> tuple[float, str]:

@@ -267,7 +267,12 @@ def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     return places.astype(float), words.tolist()
 
 
-@picture("campaign", 80, "What became of each sample, by each drawn input", applies=_has_run)
+@picture(
+    "campaign",
+    80,
+    "The main number of each sample and how it ended, by each drawn input",
+    applies=_has_run,
+)
 def by_input(campaign: xr.Dataset) -> Figure:
     """A panel an input: the main number of each sample that has run over the value drawn for it;
     of more inputs than a sheet has room for those of words and those that go with it most.
