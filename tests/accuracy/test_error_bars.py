@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import error_lines, error_tables
 from ringsim.campaign.run import run_cases
@@ -310,7 +311,11 @@ def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) 
         assert (found.status == 0).all()
         np.testing.assert_array_equal(found.solver_step, [0.2, 0.1])
         errors = found.deployment_time_error.values
+        assert any(" +- " in line for line in notes(found))
     assert errors[1] < errors[0]
-    assert " +- " in capfd.readouterr().err
+    # Who asked for the cases tells what they mean.
+    begin, end = capfd.readouterr().err.splitlines()
+    assert "0 of 2 samples done" in begin
+    assert end.endswith("campaign.nc: 2 samples, 0 failed")
     with pytest.raises(InputError, match="case 1"):
         run_cases(tmp_path / "b", "x", scene, [{"a": 1}, {"b": 2}], workers=1)

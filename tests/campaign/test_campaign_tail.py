@@ -75,7 +75,7 @@ def test_the_report_shows_the_tail_and_no_means_of_its_samples(tail, monkeypatch
     found, text = analyse(campaign), page(campaign, "runs/tail")
     low, high = found.tail_probability_interval.values
     assert f"<td>{found.tail_probability.item():.3g}</td>" in text
-    assert f"<td>{low:.2g} .. {high:.2g}</td>" in text
+    assert f'<td class="range">{low:.2g} .. {high:.2g}</td>' in text
     assert 'id="figure-rare_event"' in text
     assert "A design of kind subset-simulation stands for no population" in text
     assert 'id="figure-convergence"' not in text
