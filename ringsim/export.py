@@ -79,7 +79,7 @@ def write_csv(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
     columns = {name: ("name", words) for name, words in about.items()}
     table = xr.Dataset(columns, coords={"name": [str(name) for name in dataset.variables]})
     with whole(path, lasting=False) as draft:
-        table.to_dataframe().to_csv(draft)
+        _no_formula(table.to_dataframe().reset_index()).to_csv(draft, index=False)
     return [*written, path]
 
 

@@ -57,10 +57,13 @@ def run_file(campaign: xr.Dataset, tmp_path: Path) -> Path:
 
 def test_a_spreadsheet_computes_no_word(file: Path, campaign: xr.Dataset) -> None:
     words = np.array(["=1+1", "-0.5", "@x", "-"], dtype=object)
-    save(campaign.assign(word=("sample", words)), file)
+    says = {"long_name": "=cmd"}
+    save(campaign.assign(word=("sample", words, says)), file)
     export(file, "--variables", "word")
     found = pd.read_csv(file.with_name("campaign-sample.csv"), keep_default_na=False)
     assert found["word"].tolist() == ["'=1+1", "-0.5", "'@x", "-"]
+    about = pd.read_csv(file.with_name("campaign-variables.csv")).set_index("name")
+    assert about.loc["word", "meaning"] == "'=cmd"
 
 
 @pytest.mark.parametrize("block", [1 << 22, 100])
