@@ -552,7 +552,7 @@ def open_stored(path: Path) -> xr.Dataset:
         if file.name == MERGED and (file.parent / "design.nc").exists():
             cure = f"not merged yet: give ringsim merge {file.parent} first, also while it runs"
         raise InputError(f"{file}: {cure}") from None
-    except UnicodeEncodeError:  # of the file's name, see ringsim.cli
+    except (InputError, UnicodeEncodeError):  # the latter of the file's name, see ringsim.cli
         raise
     except (OSError, ValueError) as error:
         if file.suffix == ".toml":
