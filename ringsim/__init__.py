@@ -36,6 +36,8 @@ _HOMES = {
     "Scene": "scene", "load_scene": "scene", "simulate": "simulation",
     "read_state": "stored_state",
 }  # fmt: skip
+_OF_DATASETS = ("analyse", "compare", "Campaign", "open_campaign", "simulate")
+"""Words that give datasets, or take them."""
 
 
 def __getattr__(name: str) -> Any:
@@ -49,7 +51,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     word = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
-    if "xarray" in sys.modules:  # which takes most of a second: not for a scene alone
+    # xarray takes most of a second: not for a scene alone.
+    if name in _OF_DATASETS or "xarray" in sys.modules:
         register()
     return word
 

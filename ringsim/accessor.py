@@ -1,15 +1,17 @@
 """What every dataset of ringsim can be asked as ``dataset.ring``.
 
-It is there once a public word of ringsim has been used, or ringsim was imported after xarray; else
-``ringsim.register()``.
+``ringsim.simulate`` and other words that give datasets bring it along; so does
+``xarray.open_dataset``, which loads the entry points of all packages (``Opening``).
 """
 
 import functools
 import html
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import xarray as xr
+from xarray.backends import BackendEntrypoint
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,6 +34,26 @@ class Figures(dict[str, "Figure"]):
             f"<p>{name}</p>{Inline(figure, name, name).element()}" for name, figure in self.items()
         )
         return f'<div style="background: white">{"".join(drawn)}</div>'
+
+
+class Opening(BackendEntrypoint):
+    """No reader of its own: xarray loads it before it opens a file, and with it ``.ring``, also
+    where ringsim was imported first or not at all.
+
+    ``engine="ringsim"`` reads as ``engine="netcdf4"`` does.
+    """
+
+    description = "Results of ringsim, by netCDF4"
+
+    def open_dataset(
+        self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
+    ) -> xr.Dataset:
+        """What netCDF4 reads."""
+        return xr.open_dataset(filename_or_obj, engine="netcdf4", drop_variables=drop_variables)
+
+    def guess_can_open(self, filename_or_obj: Any) -> bool:
+        """False: where nobody asks for it, xarray chooses among its own."""
+        return False
 
 
 @xr.register_dataset_accessor("ring")  # type: ignore[no-untyped-call]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,12 +38,16 @@ def campaign() -> xr.Dataset:
     [
         "import ringsim, xarray; ringsim.InputError", "import xarray, ringsim",
         "import ringsim.accessor, xarray, ringsim",
+        "import ringsim; ringsim.simulate; import xarray",
+        "import xarray; xarray.open_dataset(FILE); import ringsim",
+        "import ringsim, xarray; xarray.open_dataset(FILE, engine='ringsim')",
     ],
 )  # fmt: skip
-def test_every_dataset_has_it(order: str) -> None:
+def test_every_dataset_has_it(order: str, tmp_path: Path) -> None:
     """Whoever comes first, and without loading anything but xarray."""
+    xr.Dataset({"a": 1}).to_netcdf(tmp_path / "any.nc", engine="netcdf4")
     code = (
-        f"{order}\nimport sys\n"
+        f"FILE = {str(tmp_path / 'any.nc')!r}\n{order}\nimport sys\n"
         "print(type(xarray.Dataset().ring).__name__, 'scipy' in sys.modules)\n"
         "import importlib; importlib.reload(ringsim)"
     )
