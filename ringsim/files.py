@@ -12,17 +12,26 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from ringsim.refusal import InputError
+from ringsim.refusal import DEEPEST, InputError
 from ringsim.tables import size_text
 
+DESIGN, MERGED = "design.nc", "campaign.nc"
+"""Files of a campaign's folder: what is drawn, and what came of it."""
 DRAFT = ".draft"
 """How names of files end that are still being written; nobody reads them."""
+
+
+_LONGEST_TEXT = 50_000_000
+"""Letters: a scene of 1,000 sections with a value for each has a hundredth of it; /dev/zero would
+fill the memory.
+"""
 
 
 def read_text(path: Path | Traversable) -> str:
     """The text of a file; InputError if it cannot be read or is not UTF-8."""
     try:
-        return path.read_text(encoding="utf-8-sig")
+        with path.open(encoding="utf-8-sig") as file:
+            text = file.read(_LONGEST_TEXT + 1)
     except FileNotFoundError:
         raise InputError(
             f"{path}: there is no such file: check its name, and the folder that you are in"
@@ -42,13 +51,14 @@ def read_text(path: Path | Traversable) -> str:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read: {reason}") from None
+    if len(text) > _LONGEST_TEXT:
+        raise InputError(f"{path}: longer than {_LONGEST_TEXT:,} letters: not a file of ringsim's")
+    return text
 
 
-_DEEPEST = 100
-"""Levels of lists and tables: what a scene or a campaign holds has ten."""
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY = re.compile(
-    rf"^[ \t]*\[{{0,2}}[ \t]*{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_DEEPEST}}}", re.MULTILINE
+    rf"^[ \t]*\[{{0,2}}[ \t]*{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{DEEPEST}}}", re.MULTILINE
 )
 
 
@@ -75,10 +85,10 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     # Before it is read: a key of a million parts takes a minute.
     if found := _LONG_KEY.search(text):
         line = text.count("\n", 0, found.end()) + 1
-        raise InputError(f"{source}: line {line}: a key of more than {_DEEPEST} parts")
+        raise InputError(f"{source}: line {line}: a key of more than {DEEPEST} parts")
     try:
         read = tomllib.loads(text)
-        if _depth(read) > _DEEPEST:
+        if _depth(read) > DEEPEST:
             raise RecursionError
         return read
     except tomllib.TOMLDecodeError as error:
@@ -100,12 +110,18 @@ def require_place(path: Path) -> None:
 
 
 def require_file(path: Path) -> None:
-    """Refuse (InputError) a name or a place at which no netCDF file can be written."""
+    """Refuse (InputError) a name or a place at which no netCDF file can be written, and the files
+    of a campaign, which nothing else may replace.
+    """
     require_place(path)
     if path.suffix != ".nc":
         raise InputError(
             f"{path}: the file is netCDF and its name must end with .nc: write {path.stem}.nc "
             '(one variable as a table: dataset["opening_angle"].to_series().to_csv(...))'
+        )
+    if path.exists() and path.name in (DESIGN, MERGED) and path.with_name(DESIGN).exists():
+        raise InputError(
+            f"{path}: this file belongs to the campaign in its folder: choose another name"
         )
 
 
@@ -118,7 +134,8 @@ def writing(path: Path, cure: str = "make room or choose another folder") -> Ite
         yield
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path}: cannot be written: {reason}{_short(path)}; {cure}") from error
+        left = getattr(error, "__notes__", [_short(path)])[0]
+        raise InputError(f"{path}: cannot be written: {reason}{left}; {cure}") from error
 
 
 _LITTLE_LEFT = 100e6
@@ -150,7 +167,11 @@ def whole(path: Path, *, lasting: bool = True) -> Iterator[Path]:
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}{DRAFT}")
     try:
         draft.touch()  # tells why a folder refuses a file, in better words than HDF5
-        yield draft
+        try:
+            yield draft
+        except (OSError, RuntimeError) as error:
+            error.add_note(_short(path))  # as long as the draft still takes its room
+            raise
         if lasting:
             sync(draft)
         os.replace(draft, path)

@@ -1,5 +1,6 @@
 """Values at dotted paths: ``rods.bar.outer_diameter``, ``rods.young_modulus[3]``."""
 
+import difflib
 import operator
 import re
 import tomllib
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ringsim.cable.records import number_of, path_of
 from ringsim.choice import kinds_of
-from ringsim.refusal import InputError
+from ringsim.refusal import DEEPEST, InputError, shorten
 from ringsim.structures.family import Structure
 from ringsim.units import LEFT_OUT
 
@@ -32,8 +33,9 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     """
     path, _, raw = (part.strip() for part in text.partition("="))
     if not path or not raw:
-        raise InputError(f"--set {text}: must read PATH=VALUE, for example loads.force=0.02")
-    return path, parse_value(raw, f"--set {path}")
+        told = shorten(text)
+        raise InputError(f"--set {told}: must read PATH=VALUE, for example loads.force=0.02")
+    return path, parse_value(raw, f"--set {shorten(path)}")
 
 
 def parse_value(text: str, where: str) -> Any:
@@ -46,8 +48,8 @@ def parse_value(text: str, where: str) -> Any:
     except (ValueError, RecursionError) as error:
         if text.startswith(("{", "[")):
             raise InputError(
-                f"{where} = {text}: no table or list as TOML writes them ({error}): write for "
-                'example { kind = "stall", speed = 0.1 }'
+                f"{where} = {shorten(text)}: no table or list as TOML writes them ({error}): write "
+                'for example { kind = "stall", speed = 0.1 }'
             ) from None
         return text
     return table["value"] if len(table) == 1 else text
@@ -90,6 +92,8 @@ def set_path(table: dict[str, Any], path: str, value: Any) -> None:
     if isinstance(section, str):  # of something that has no names
         inner = path
     *steps, name = inner.split(".")
+    if len(steps) >= DEEPEST:
+        raise InputError(f"{shorten(path)}: a path of more than {DEEPEST} parts")
     for step in steps:
         if not _NAME.fullmatch(step):
             raise InputError(f"{path}: {step!r} is not the name of a table")
@@ -103,7 +107,9 @@ def set_path(table: dict[str, Any], path: str, value: Any) -> None:
     old = table.get(name)
     if isinstance(section, int):
         if old is None:
-            raise InputError(f"{path}: there is no {name} yet: give one value for all first")
+            near = difflib.get_close_matches(name, table, n=1, cutoff=0.6)
+            cure = f"did you mean {near[0]}?" if near else "give one value for all first"
+            raise InputError(f"{path}: there is no {name} yet: {cure}")
         values = (
             list(old) if isinstance(old, (list, tuple)) else [old] * (length_at(scene, inner) or 1)
         )

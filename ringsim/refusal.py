@@ -14,8 +14,14 @@ from ringsim.units import EACH, LEFT_OUT, ONE, Model, nested_in, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
+_MISSPELT = 0.85
+"""Likeness above which a name is one of its own table with a letter wrong, and not one of a table
+below: load and loads have 0.89.
+"""
 _MOST_KNOWN = 30
 """Names that a hint lists: more than a table of a scene or campaign has keys."""
+DEEPEST = 100
+"""Levels of lists and tables: what a scene or a campaign holds has ten."""
 LONGEST_VALUE = 60
 """Characters of a refused value that are shown."""
 
@@ -86,7 +92,12 @@ def known_or_nearest(key: str, known: Iterable[str]) -> str:
 
 def show(value: Any) -> str:
     """A value as TOML would write it, shortened."""
-    text = " ".join(_toml(value).split())
+    return shorten(_toml(value))
+
+
+def shorten(text: str) -> str:
+    """A text on one line, and cut where it is longer than a reader wants of a refused value."""
+    text = " ".join(text.split())
     return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
 
 
@@ -110,11 +121,13 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         case "extra_forbidden":
             # A model may tell of the keys that it once had.
             hint = getattr(owner, "gone", {}).get(key) or _other_kinds_key(path, owner)
-            if not hint and owner is not None and (inner := list(_below(key, owner))):
-                hint = f"did you mean {' or '.join(inner[:MOST_NAMED])}?"
             keys = owner.model_fields if owner else {}
             # A key that is a word of Python has another name in the model.
             known = [each.alias or name for name, each in keys.items()]
+            misspelt = difflib.get_close_matches(key.lower(), known, n=1, cutoff=_MISSPELT)
+            below = [] if owner is None or misspelt else list(_below(key, owner))
+            if not hint and below:
+                hint = f"did you mean {' or '.join(below[:MOST_NAMED])}?"
             hint = hint or known_or_nearest(key, known)
             return f"{where} is not a known key ({hint})"
         case "union_tag_invalid":

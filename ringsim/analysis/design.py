@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ringsim.analysis import intervals
 from ringsim.analysis.intervals import NONE, NOTHING, Interval, good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
+from ringsim.files import DESIGN, MERGED
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import BLOCK_ROW
@@ -489,9 +490,6 @@ def any_finite(campaign: xr.Dataset, name: str) -> bool:
 # Opening what ringsim has stored: campaigns and runs, by folder or by file.
 
 
-MERGED = "campaign.nc"
-
-
 _NOT_RUN = -1
 _MOST_ENTRIES = 10**9
 """Of a dimension: a file may claim to have more, and memory would be asked for all of them."""
@@ -527,7 +525,7 @@ def open_stored(path: Path) -> xr.Dataset:
     if path.is_dir():
         file = path / MERGED
         if not file.exists():
-            inside = (path / "design.nc").exists()
+            inside = (path / DESIGN).exists()
             cure = "there is no campaign in it: give the folder that ringsim campaign named"
             if inside and any(path.glob("journals/*")):
                 cure = f"its results are not merged yet: give ringsim merge {path} first"
@@ -549,7 +547,7 @@ def open_stored(path: Path) -> xr.Dataset:
                 variable.load()
     except FileNotFoundError:
         cure = "there is no such file or folder: check its name, and the folder that you are in"
-        if file.name == MERGED and (file.parent / "design.nc").exists():
+        if file.name == MERGED and (file.parent / DESIGN).exists():
             cure = f"not merged yet: give ringsim merge {file.parent} first, also while it runs"
         raise InputError(f"{file}: {cure}") from None
     except (InputError, UnicodeEncodeError):  # the latter of the file's name, see ringsim.cli

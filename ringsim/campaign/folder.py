@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ringsim import build
 from ringsim.analysis.requirements import to_json
 from ringsim.campaign.specification import SOLVERS, Campaign
-from ringsim.files import DRAFT, writing
+from ringsim.files import DESIGN, DRAFT, writing
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import Table
@@ -25,7 +25,6 @@ from ringsim.sampling.distributions import plain
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.journal import FOLDER, Survey, survey
 from ringsim.storage.netcdf import (
-    DESIGN,
     GO_ON,
     locked,
     provenance,
@@ -120,14 +119,14 @@ def prepare_folder(
 
 def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool:
     """Whether there is nothing to write to the folder: it is neither new nor does it grow."""
+    try:  # before the design is looked for: another command may write it just now
+        names = sorted(entry.name for entry in path.iterdir()) if path.exists() else []
+    except OSError as error:
+        raise InputError(f"{path}: this is no folder to write to: {error.strerror}") from None
     if (old := opened_as(campaign, path, table, solver)) is not None:
         told = old.attributes["campaign"], old.attributes.get("suspects", "[]")
         same = told == (campaign.text, json.dumps(campaign.suspects))
         return same and old.table.samples == table.samples
-    try:
-        names = sorted(entry.name for entry in path.iterdir()) if path.exists() else []
-    except OSError as error:
-        raise InputError(f"{path}: this is no folder to write to: {error.strerror}") from None
     ours = (FOLDER, "lock", "progress", ".design", ".progress")
     strangers = [name for name in names if not name.startswith(ours)]
     if strangers:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_notes import ending_lines
-from ringsim.analysis.design import MERGED, placement_of
+from ringsim.analysis.design import placement_of
 from ringsim.analysis.influence import pairs
 from ringsim.analysis.intervals import samples_needed
 from ringsim.analysis.requirements import Requirement
@@ -22,6 +22,7 @@ from ringsim.campaign.stopping import End, decided, looks_of
 from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
 from ringsim.execution.work import Array, Work, relative_cost
+from ringsim.files import MERGED
 from ringsim.refusal import show
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.designs.blocks import Grouped

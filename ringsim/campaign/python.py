@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 import xarray as xr
 
-from ringsim.analysis.design import MERGED, open_stored
+from ringsim.analysis.design import open_stored
 from ringsim.analysis.engines import too_far
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.plan import plan
@@ -20,6 +20,7 @@ from ringsim.campaign.stopping import is_behind, merge
 from ringsim.choice import kind_of
 from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED
+from ringsim.files import MERGED
 from ringsim.overrides import flat
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import label_of

@@ -32,14 +32,13 @@ from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.slot import Local, Serial
 from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
-from ringsim.files import write_text, writing
+from ringsim.files import DESIGN, MERGED, write_text, writing
 from ringsim.refusal import InputError
 from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.distributions import Array
 from ringsim.scene import Scene
 from ringsim.storage.journal import Journal
-from ringsim.storage.merge import NAME as MERGED
-from ringsim.storage.netcdf import DESIGN, reserved
+from ringsim.storage.netcdf import reserved
 from ringsim.storage.result import Result, check_of, sample_of
 from ringsim.variables import GOALS, Fate, Status
 

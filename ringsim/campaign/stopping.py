@@ -16,12 +16,11 @@ from ringsim.analysis.design import placement
 from ringsim.analysis.requirements import OUTCOME, required_by
 from ringsim.analysis.verdicts import Rule, holds, rule_of
 from ringsim.campaign.folder import Folder
-from ringsim.files import DRAFT, writing
+from ringsim.files import DESIGN, DRAFT, MERGED, writing
 from ringsim.refusal import InputError
 from ringsim.storage.journal import FOLDER, DamagedError
-from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.merge import write_merged
-from ringsim.storage.netcdf import DESIGN, GO_ON, OutputTable, locked, provenance
+from ringsim.storage.netcdf import GO_ON, OutputTable, locked, provenance
 from ringsim.storage.result import sample_of
 from ringsim.variables import Fidelity
 

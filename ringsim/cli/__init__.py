@@ -104,8 +104,8 @@ def cli() -> None:
 
 
 class _Told:
-    """Standard output whose reader may stop reading (``ringsim run ... | head``), or which is
-    closed or full: what a verb was called for is done all the same.
+    """Standard output or error whose reader may stop reading (``ringsim run ... | head``), or which
+    is closed or full: what a verb was called for is done all the same.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -142,9 +142,7 @@ class _Told:
 
 def main() -> None:
     """The command ``ringsim``, see ``ringsim.__main__``."""
-    sys.stdout = out = _Told(sys.stdout)
-    if sys.stderr is None:  # closed
-        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    sys.stdout, sys.stderr = out, _ = _Told(sys.stdout), _Told(sys.stderr)
     try:
         code = cli(standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:

@@ -7,7 +7,7 @@ import click
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import notes
-from ringsim.analysis.design import MERGED, called, inputs, median_and_worst, open_stored
+from ringsim.analysis.design import called, inputs, median_and_worst, open_stored
 from ringsim.analysis.engines import check_lines
 from ringsim.analysis.requirements import parse_requirements, required_by
 from ringsim.campaign.folder import open_folder
@@ -26,7 +26,7 @@ from ringsim.cli.options import (
 )
 from ringsim.dataset import save
 from ringsim.exit_codes import EXIT_DONE, EXIT_NOT_MET
-from ringsim.files import require_file, require_place, writing
+from ringsim.files import MERGED, require_file, require_place, writing
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
 from ringsim.tables import counted

@@ -87,6 +87,7 @@ def _write_with_schema(text: str, out: Path) -> None:
         click.echo(f"wrote {path}")
 
 
+_TIED = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 _ASKED = ("margin", "hinge_spring", "temperature")
 """What few scenes name: not told of as left out."""
 MOST_SECTIONS_FOR_MOBILITY = 72
@@ -123,10 +124,13 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
     told = {label: text for label, text in _summary(loaded).items() if text}
     wide = max(map(len, told)) + 2
     for label, text in told.items():
-        lines = textwrap.wrap(text, _COLUMNS - wide, break_long_words=False, break_on_hyphens=False)
-        click.echo(f"{label:<{wide}}{lines[0]}")
-        for line in lines[1:]:
-            click.echo(" " * wide + line)
+        # A value stays on the line of its key.
+        lines = textwrap.wrap(
+            text.replace(" = ", _TIED), _COLUMNS - wide,
+            break_long_words=False, break_on_hyphens=False,
+        )  # fmt: skip
+        for number, line in enumerate(lines):
+            click.echo(f"{'' if number else label:<{wide}}{line.replace(_TIED, ' = ')}")
     click.echo("valid: ringsim run FILE runs it")
 
 
@@ -235,6 +239,8 @@ def _shortened(value: Any) -> str:
         if all(isinstance(each, (int, float)) for each in value):
             return f"{len(value)} values from {min(value):g} to {max(value):g}"
         return f"{len(value)} values"
+    if isinstance(value, float):  # from degrees and back again: 19.999999999999996
+        return show(float(f"{value:.12g}"))
     return show(value)
 
 

@@ -221,6 +221,8 @@ class Integration(Run):
             if control.goes_on and solver.InitializeSolver(system, self._settings):
                 solver.SolveSteps(system, self._settings)
         except exu.ExudynError as error:
+            if "KeyboardInterrupt" in str(error):  # Ctrl-C within one of our own functions
+                raise KeyboardInterrupt from error
             # What our own functions raise is no failure of the solver, as exudyn calls it: smaller
             # steps would not help.  Cables that have no answer say so in this way, too.
             if "USER FUNCTION" in str(error) and not self._refusal():

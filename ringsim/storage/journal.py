@@ -16,9 +16,9 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.files import sync, whole, writing
+from ringsim.files import DESIGN, sync, whole, writing
 from ringsim.refusal import InputError
-from ringsim.storage.netcdf import DESIGN, GO_ON, NOT_RUN
+from ringsim.storage.netcdf import GO_ON, NOT_RUN
 from ringsim.storage.result import Result
 from ringsim.tables import counted
 from ringsim.variables import Fate, Status

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.analysis.intervals import CHECKED
-from ringsim.files import whole
+from ringsim.files import MERGED, whole
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, span_names
 from ringsim.sampling.columns import Table, add_inputs
@@ -21,7 +21,6 @@ from ringsim.storage.netcdf import PER_SAMPLE
 from ringsim.storage.result import sample_of
 from ringsim.variables import Cause, Status, Variable
 
-NAME = "campaign.nc"
 _OF_SAMPLES = ("log", "overrides", "attempts")
 """What is not told of checks."""
 BLOCK_BYTES = 64 << 20
@@ -57,7 +56,7 @@ def write_merged(
         for name, variable in VARIABLES.items()
         if name in names | scalars and name not in PER_SAMPLE and name not in output.leave_out
     } | PER_SAMPLE
-    with whole(folder / NAME) as draft, netCDF4.Dataset(draft, "w") as file:
+    with whole(folder / MERGED) as draft, netCDF4.Dataset(draft, "w") as file:
         file.setncatts(dict(attributes))
         netcdf.add_coordinate(file, "sample", np.arange(table.samples))
         for name, values in axes.items():

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim import build
-from ringsim.files import whole, writing
+from ringsim.files import DESIGN, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
 from ringsim.refusal import InputError, known_or_nearest
@@ -30,7 +30,6 @@ from ringsim.variables import Fidelity, Variable, flags_of
 # How variables lie in netCDF files, and where these come from; ``design.nc``.
 
 
-DESIGN = "design.nc"
 _PACKAGES = ("exudyn", "numpy", "scipy", "netCDF4", "mpi4py")
 
 NOT_RUN = -1
@@ -201,10 +200,11 @@ def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[
     """Hold an advisory lock; False if another process holds it, unless it may ``wait``.
 
     Others may hold a shared lock, too.  OSError if its file is not there and cannot be created;
-    InputError if it is a link: what that leads to is none of ours.
+    InputError if it is a link, what that leads to is none of ours, or no file.
     """
-    if path.is_symlink():
-        raise InputError(f"{path}: is a link, where a lock of the campaign should be: remove it")
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        what = "a link" if path.is_symlink() else "a folder" if path.is_dir() else "no file"
+        raise InputError(f"{path}: is {what}, where a lock of the campaign should be: remove it")
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
     except OSError:

@@ -280,7 +280,7 @@ class PantographRing(Structure):
     """Minor over major axis of the ellipse."""
     half_bar: Metre = 0.2889
     """Length of each half of a folding bar, from hinge pin to V-joint: in a closed, regular ring of
-    N sections and diameter D through its corners, D sin(pi / N) / 2 - hinge_offset.
+    N sections and aperture diameter D through its corners, D sin(pi / N) / 2 - hinge_offset.
     """
     half_diagonal: Metre = 0.4275
     """Half the length of a diagonal, from hinge pin to pivot."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 from pathlib import Path
 from types import SimpleNamespace
@@ -52,6 +53,15 @@ def test_a_lock_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").touch()
     with pytest.raises(InputError, match="lock: is a link"), locked(tmp_path / "lock"):
         pass
+
+
+def test_a_lock_is_a_file(tmp_path: Path) -> None:
+    """Whoever opens a pipe would wait for its other end."""
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    for name, what in ("folder", "a folder"), ("pipe", "no file"):
+        with pytest.raises(InputError, match=f"{name}: is {what}"), locked(tmp_path / name):
+            pass
 
 
 def test_progress_tells_what_samples_and_checks_took(tmp_path: Path) -> None:

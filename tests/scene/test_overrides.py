@@ -154,6 +154,20 @@ def test_broken_table_is_refused_as_such(value: str) -> None:
         parse_assignment(f"boom={value}")
 
 
+def test_what_is_long_is_told_short() -> None:
+    with pytest.raises(InputError, match=r"^a\.a\.a.*\.\.\.: a path of more than 100 parts$"):
+        changed(RING18, f"{'a.' * 5000}a=1")
+    for text in ("x" * 9000, f"boom={'[' * 9000}"):
+        with pytest.raises(InputError) as caught:
+            parse_assignment(text)
+        assert len(str(caught.value)) < 300
+
+
+def test_a_misspelt_list_is_told_the_nearest() -> None:
+    with pytest.raises(InputError, match=r"yuong_modulus yet: did you mean young_modulus\?"):
+        changed(RING18, "rods.yuong_modulus[3]=1e11")
+
+
 @for_each(
     "path",
     ["structure.sections", "structure.closed", "structure.opening_angle", "loads.force",

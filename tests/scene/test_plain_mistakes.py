@@ -117,6 +117,22 @@ def test_other_suffix_than_nc_is_refused_before_the_run(tmp_path: Path) -> None:
         save(xr.Dataset(), tmp_path / "t.h5")
 
 
+def test_files_of_a_campaign_are_not_replaced(tmp_path: Path) -> None:
+    """The scenes of a campaign lie beside its results, and so may those of a run."""
+    run = "run", "truss2", "--fidelity", "frame", "--set", "solver.end_time=0.2", "--out"
+    (tmp_path / "campaign.nc").write_text("any")
+    assert "replaced" in ringsim(*run, tmp_path / "campaign.nc")
+    for name in ("design.nc", "campaign.nc"):
+        (tmp_path / name).write_text("kept")
+    for name in ("design.nc", "campaign.nc"):
+        assert "belongs to the campaign in its folder" in refused(*run, tmp_path / name)
+        assert (tmp_path / name).read_text() == "kept"
+
+
+def test_a_file_without_end_is_refused() -> None:
+    assert refused("check", "/dev/zero").startswith("/dev/zero: longer than 50,000,000 letters")
+
+
 def test_a_run_says_that_it_replaces_a_file(tmp_path: Path) -> None:
     words = "run", "truss2", "--fidelity", "frame", "--set", "solver.end_time=0.2", "--out"
     path = tmp_path / "t.nc"
