@@ -157,7 +157,7 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
     """
     table: dict[str, dict[str, Any]] = {}
     for text in texts:
-        name, found, rest = re.match(r"\s*(\w*)\s*([:=]?)(.*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
+        name, place, found, rest = re.match(_HEAD, text, re.DOTALL).groups()  # type: ignore[union-attr]
         parts = [re.fullmatch(_BOUND, part.strip()) for part in rest.split(",")]
         if not name or not found or None in parts:
             raise InputError(
@@ -167,15 +167,21 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
             )
         if name in table:
             raise InputError(f"--require {name} is given twice: leave out one of the two")
+        if place:
+            many = name in VARIABLES and VARIABLES[name].dims
+            cure = instead_of(name) if many else f"a sample has one value: leave out {place}"
+            raise InputError(f"--require {name}{place}: {cure}")
         for part in parts:
             _require_unit(name, part[1], part[2], part[3])  # type: ignore[index]
         table[name] = {part[1]: _value(part[2]) for part in parts if part}
     return read_requirements(table, "--require")
 
 
+_HEAD = r"\s*(\w*)(\[[^\]]*\])?\s*([:=]?)(.*)"
+"""The name of an output, perhaps a place in it, and what is required."""
 _BOUND = r"(\w+)(?:\s*=\s*|\s+)(\S+)(?:\s+(\S.*))?"
 """A key, its value, and for a bound perhaps its unit."""
-_SHORT = {"deg": "degree"}
+_SHORT = {"deg": "degree", "degrees": "degree"}
 
 
 def _require_unit(name: str, key: str, value: str, unit: str | None) -> None:

@@ -17,6 +17,8 @@ from typing import Any, NamedTuple, TypeVar, cast, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.refusal import InputError
+
 _FOLDER = Path(__file__).parent / "c"
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
 ASKED = ctypes.CFUNCTYPE(_WHOLE, _WHOLE)
@@ -73,7 +75,7 @@ _MOST_KNOWN = 64
 """Packed tables that are kept at most."""
 
 
-class NotBuiltError(RuntimeError):
+class NotBuiltError(InputError):
     """The core has not been compiled where this package lies, or of other sources."""
 
 

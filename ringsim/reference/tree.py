@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ringsim.campaign.specification import Specification
 from ringsim.overrides import place_of
 from ringsim.reference.keys import Key, keys_of, kind_in, words_of
-from ringsim.refusal import InputError, known_or_nearest
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.units import LEFT_OUT, Model
 
@@ -107,12 +107,15 @@ def known(path: str, others: list[str]) -> list[Found]:
     ends = list(dict.fromkeys(one for one in every if one.endswith(f".{plain}")))
     if len(ends) == 1:
         return find(ends[0])
-    near = ends[:2] or difflib.get_close_matches(plain, [*others, *every], n=1, cutoff=0.6)
-    # One letter is in every meaning.
-    near = near or (_told_of(plain, every)[:3] if len(plain) > 2 else [])
+    # Words of meanings before words that look alike: an aperture is no temperature.  One letter is
+    # in every meaning.
+    near = ends[:2] or (_told_of(plain, every)[:3] if len(plain) > 2 else [])
+    near = near or difflib.get_close_matches(plain, [*others, *every], n=1, cutoff=0.6)
+    near = near or [name for name in others if name.startswith(plain)][:3]
     hint = (
-        f"did you mean {' or '.join(near)}?" if near else known_or_nearest(plain, [*ROOTS, *others])
-    )
+        f"did you mean {' or '.join(near)}?" if near else
+        "ringsim explain lists the variables, ringsim explain scene and campaign the keys"
+    )  # fmt: skip
     raise InputError(
         f"{path}: no key of a scene or a campaign, and no variable of a result ({hint})"
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Self, get_origin
+from typing import Annotated, Any, ClassVar, Self, get_origin
 
 import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
@@ -38,6 +38,13 @@ MOST_RECORDS = 1_000_000
 
 class Scene(Model):
     """A structure with its loads and how to solve it.  Parts left out are not built."""
+
+    gone: ClassVar[dict[str, str]] = {
+        "fidelity": "it belongs to a campaign file, or behind --fidelity",
+        "samples": "a campaign has samples: ringsim campaign FILE --samples N",
+        "inputs": "it belongs to a campaign file",
+        "requirements": "it belongs to a campaign file",
+    }
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     """Word for the scene in files and messages."""

@@ -64,11 +64,20 @@ def test_wrong_requirements_are_told_with_the_cure(table, words):
         (["asynchrony_max"], "must read NAME: KEY VALUE"),
         (["asynchrony_max: 10"], "must read NAME: KEY VALUE"),
         (["outcome: is deployed", "outcome: is folded"], "given twice"),
+        (["latch_rate[upper,2]: max 3"], r"latch_rate\[upper,2\]: .*its largest, peak_latch_rate"),
+        (["peak_tension[1]: max 3"], r"peak_tension\[1\]: a sample has one value: leave out \[1\]"),
+        (["asynchrony_max: max 10 rad, probability 0.9"], "max = 10 rad: give it in degree"),
     ],
 )
 def test_wrong_texts_are_told_with_an_example(texts, words):
     with pytest.raises(InputError, match=words):
         parse_requirements(texts)
+
+
+def test_degrees_have_three_names():
+    for unit in "deg", "degree", "degrees":
+        text = f"asynchrony_max: max 10 {unit}, probability 0.99, confidence 0.9"
+        assert parse_requirements([text])["asynchrony_max"].max == 10.0
 
 
 def test_a_campaign_refuses_what_its_scene_does_not_tell(tmp_path):

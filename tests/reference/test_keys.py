@@ -127,6 +127,8 @@ def test_keys_that_scenes_and_campaigns_share_are_told_of_both() -> None:
         ("asynchronie", "did you mean asynchrony?"),
         # A word of the meaning: the ring's diameter is no key, but follows from one.
         ("diameter", "did you mean structure.half_bar or "),
+        ("aperture", "did you mean structure.half_bar"),
+        ("nosuch", "ringsim explain lists the variables"),
     ],
 )
 def test_a_misspelt_name_is_refused_with_the_nearest(name: str, meant: str) -> None:

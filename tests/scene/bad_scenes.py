@@ -34,6 +34,8 @@ UNKNOWN_KEYS = [
     _scene("other kind's key", 'boom = { kind = "rigid", elements = 4 }', "boom.elements"),
     _scene("net", "net.neutral = 0.7", "net.neutral", "did you mean neutral_length?"),
     _scene("loads", "loads.forces = 0.015", "loads.forces is not", "did you mean force?"),
+    _scene("table for another", "load.force = 0.015", "load is not", "did you mean loads?"),
+    _scene("key of a campaign", 'fidelity = "frame"', "fidelity", "behind --fidelity"),
     _scene("Celsius", "temperature.bar.value = -40.0", "at least 1 K; -40 C are 233.15 K"),
     _scene("capital letters", "loads.force = 1.0\nloads.Force = 1.0", "loads.Force", "mean force?"),
     _scene("solver", "solver.time_step = 0.1", "solver.time_step", "did you mean step?"),
