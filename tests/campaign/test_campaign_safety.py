@@ -17,7 +17,7 @@ import xarray as xr
 
 from campaign_bench import MODULES, Bench, comparable, journals, lose, opened, records
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.plan import _left
+from ringsim.campaign.plan import time_left
 
 
 @pytest.fixture(scope="module")
@@ -178,14 +178,14 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     folder = open_folder(copied.folder / "out")
     left, each = 2, np.array([4.0, 30.0])
     checked = SimpleNamespace(unchecked=lambda: np.array([0, 5]))
-    assert _left(checked, left, each, 2) == "about 34 s"
-    assert _left(checked, left, np.array([4.0, 0.0]), 2) == (
+    assert time_left(checked, left, each, 2) == "about 34 s"
+    assert time_left(checked, left, np.array([4.0, 0.0]), 2) == (
         "about 4 s, and 2 checks, of which none has ended yet"
     )
-    assert _left(folder, left, each, 2) == "about 4 s"
+    assert time_left(folder, left, each, 2) == "about 4 s"
     # The last one leaves workers idle; nothing is known before one has ended.
-    assert _left(folder, 1, np.array([100.0, 0.0]), 48) == "about 100 s"
-    assert _left(checked, left, np.zeros(2), 2) == "not known yet"
+    assert time_left(folder, 1, np.array([100.0, 0.0]), 48) == "about 100 s"
+    assert time_left(checked, left, np.zeros(2), 2) == "not known yet"
 
 
 def test_stop_signal_reaches_all_ranks(bench, mpi):
