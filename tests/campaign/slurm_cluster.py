@@ -125,7 +125,8 @@ def stop(cluster):
             number = int((cluster.folder / f"{name}.pid").read_text())
             if name not in Path(f"/proc/{number}/comm").read_text():
                 continue
-            os.kill(number, signal.SIGTERM)
+            # The controller would write its state for seconds, which nobody will read.
+            os.kill(number, signal.SIGKILL if name == "slurmctld" else signal.SIGTERM)
         except (OSError, ValueError):
             continue
         for _ in range(50):
