@@ -123,6 +123,7 @@ def test_the_page_has_no_figure_of_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     assert 'id="figure-tornado"' not in text
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_a_page_that_would_be_too_large_has_pictures_for_lines(monkeypatch) -> None:
     campaign = made_campaign(8)
     lines = page(campaign, "runs/made")
