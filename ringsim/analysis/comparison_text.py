@@ -9,6 +9,7 @@ from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section, digits_of
 from ringsim.analysis.worst import NOTE, marked
 from ringsim.tables import Table, counted, interval_text, number_text, slim, unit_text, with_unit
+from ringsim.variables import Fate
 
 _NAMED = 20
 """Changed outcomes, and values of scenes, that are listed at most."""
@@ -41,7 +42,22 @@ def head_lines(found: xr.Dataset) -> list[str]:
             told = f" ({found.attrs[f'{side}_name']})" if title and name != side else ""
             lines.append(f"{side}: {title or found.attrs[f'{side}_name']}{told}")
     lines.append(f"{found.attrs['pairing']}{pairs}")
-    return [*lines, *filter(None, [found.attrs[NOTE], found.attrs["intervals"]])]
+    return [*lines, *filter(None, [found.attrs[NOTE], found.attrs["intervals"]]), *_cut_off(found)]
+
+
+def _cut_off(found: xr.Dataset) -> Iterator[str]:
+    """What the samples that ended before their antenna came to rest mean for the numbers."""
+    word = Fate.CUT_OFF.words
+    if found.attrs["runs"] or word not in found["kind"].values:
+        return
+    counts = found["kind_samples"].sel(kind=word).values.tolist()
+    for side, name, count in zip(("first", "second"), names_of(found), counts, strict=True):
+        if count:
+            samples = f"{count} of {counted(found.attrs[f'{side}_samples'], 'sample')}"
+            yield (
+                f"{name}: solver.end_time cut off {samples}: what grows with time counts with what "
+                "it was by then, so that it is at least as large"
+            )
 
 
 def names_of(found: xr.Dataset) -> tuple[str, str]:

@@ -121,8 +121,10 @@ def new_panels(
 
 
 def title(figure: Figure, text: str) -> None:
-    """A bold title in the upper left corner of the sheet."""
-    figure.suptitle(plain(text), x=0.012, ha="left")
+    """A bold title in the upper left corner of the sheet, in lines that fit it."""
+    width = int(10.3 * figure.get_size_inches()[0])
+    lines = (textwrap.fill(line, width) for line in text.split("\n"))
+    figure.suptitle(plain("\n".join(lines)), x=0.012, ha="left")
 
 
 def plain(text: str) -> str:
