@@ -16,7 +16,7 @@ from ringsim.analysis.intervals import good, numbers, tells_of, used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import legend, limits
-from ringsim.tables import interval_text, number_text, with_unit
+from ringsim.tables import estimate_text, interval_text, readable, unit_text, with_unit
 
 _LOOKS = ((style.BLUE, "-"), (style.ORANGE, (0, (5, 1.5))))
 """Colour and dashes of either: dashes tell them apart in grey."""
@@ -40,6 +40,14 @@ def figures_of_both(
     found: xr.Dataset, first: xr.Dataset, second: xr.Dataset
 ) -> Iterator[tuple[str, str, Figure]]:
     """Name, what it shows in words, and figure, of what ``compare`` has found of two datasets."""
+    for name, words, figure in _figures(found, first, second):
+        style.in_readable_units(figure)
+        yield name, words, figure
+
+
+def _figures(
+    found: xr.Dataset, first: xr.Dataset, second: xr.Dataset
+) -> Iterator[tuple[str, str, Figure]]:
     both = population_of(first), population_of(second)
     if "sample" in first.dims:
         known = [set(scalars(each)) for each in both]
@@ -88,8 +96,11 @@ def pairs(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
                 axes.plot(one[own], apart[own], marker, color=colour, markersize=4.5, alpha=0.8,
                           linestyle="none", label=word, rasterized=own.sum() > 500)  # fmt: skip
         units = str(both[0][name].attrs.get("units", "1"))
+        mean = found[f"{name}_difference"].item()
+        factor, units = readable(units, np.nanmax(np.abs(one)))
+        mean, low, high = factor * mean, factor * low, factor * high
         axes.set_title(textwrap.fill(
-            f"mean {with_unit(number_text(found[f'{name}_difference'].item(), 3), units)}"
+            f"mean {estimate_text(mean, low, high, 3)} {unit_text(units)}".rstrip()
             + (f" ({interval_text(low, high, 3)})" if np.isfinite(low + high) else "")
             + f", n = {int(known.sum())}", _WIDE), fontsize=9,
         )  # fmt: skip
@@ -118,9 +129,10 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
         wanted = dict.fromkeys(limit for each in both for limit in limits(each, name))
         for word, limit in wanted:
             axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (1, 1.5)), linewidth=1.3)
-            axes.annotate(f"{word} {limit:g}", (limit, 1.0), xytext=(0, 2), ha="center",
+            units = str(both[0][name].attrs.get("units", "1"))
+            axes.annotate(f"{word} {with_unit(f'{limit:g}', units)}", (limit, 1.0), ha="center",
                           color=style.VERMILLION, xycoords=axes.get_xaxis_transform(),
-                          textcoords="offset points", fontsize=9)  # fmt: skip
+                          textcoords="offset points", xytext=(0, 2), fontsize=9)  # fmt: skip
         axes.set_title(f"n = {', '.join(counts)}", fontsize=9, pad=16.0 if wanted else None)
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
