@@ -14,10 +14,11 @@ import xarray as xr
 from loops import for_each
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from ringsim.dataset import to_dataset
 from ringsim.outputs import VARIABLES
-from ringsim.plots import figures, registry
+from ringsim.plots import figures, registry, style
 from ringsim.plots.figures import PICTURES, draw_figures, figures_of, left_out
 from ringsim.plots.ring import ring
 from ringsim.plots.rods_and_cables import default_sections, rod_stress
@@ -122,8 +123,19 @@ def test_every_section_of_both_planes_has_its_line(drawn, deployed):
         assert lines.get_array().tolist() == list(range(1, 19))
         for section, segment in enumerate(segments, start=1):
             wanted = deployed.opening_angle.sel(plane=plane, section=section)
-            np.testing.assert_array_equal(segment[:, 0], deployed.time)
-            np.testing.assert_array_equal(segment[:, 1], wanted)
+            np.testing.assert_array_equal(segment[:-1, 0], deployed.time)
+            np.testing.assert_array_equal(segment[:-1, 1], wanted)
+            assert segment[-1].tolist() == [float(deployed.final_time), 180.0]
+
+
+def test_courses_of_a_deployed_ring_go_on_behind_its_last_record(deployed):
+    run = deployed.isel(time=slice(0, 170))  # up to 16.9 s
+    for axes, last in zip(opening_angles(run).axes[:4], (180.0, 180.0, 0.0, 0.0), strict=True):
+        for segment in axes.collections[0].get_segments():
+            assert segment[-2:, 0].tolist() == [float(run.deployment_time), float(run.final_time)]
+            assert segment[-2:, 1].tolist() == [last, last]
+    (line,) = (line for line in asynchrony(run).axes[0].lines if len(line.get_xdata()) > 2)
+    assert line.get_xydata()[-2].tolist() == [float(run.deployment_time), 0.0]
 
 
 def test_deviations_add_up_to_nothing(drawn):
@@ -206,6 +218,33 @@ def test_stress_lines_are_the_halves_of_the_diagonals_in_black_and_red(drawn, de
             np.testing.assert_array_equal(line.get_ydata(), 1e-6 * values)
         red = [mpl.colors.to_rgb(line.get_color())[0] > 0.5 for line in lines]
         assert red == [False, False, True, True]
+        # In grey dashes tell sections apart, and widths halves.
+        assert [line.get_linestyle() for line in lines] == ["-", "-", "--", "--"]
+        assert lines[0].get_linewidth() == lines[2].get_linewidth() > lines[1].get_linewidth()
+
+
+def test_limits_of_loads_are_drawn_and_within_the_axes(deployed, scene_of):
+    held = scene_of(18).with_values({"limits.rod_stress": 9e6, "record.stress": True})
+    for axes in rod_stress(deployed.assign_attrs(scene=held.to_toml())).axes:
+        assert [9.0, 9.0] in [list(line.get_ydata()) for line in axes.lines]
+        assert axes.get_ylim()[1] > 9.0
+        assert "limits.rod_stress = 9 MPa" in [text.get_text() for text in axes.texts]
+    assert not any("limits." in text.get_text() for text in rod_stress(deployed).findobj(Text))
+
+
+def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([1e6, 3e7], [1.0, 2.0])
+    axes.set_xlabel("Largest stress (Pa)")
+    axes.set_ylabel("Force (N)")
+    axes.set_title("of stress (Pa)")
+    style.in_readable_units(figure)
+    figure.draw_without_rendering()
+    told = [axes.get_xlabel(), axes.get_ylabel(), axes.get_title()]
+    assert told == ["Largest stress (MPa)", "Force (N)", "of stress (MPa)"]
+    for place, tick in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):
+        assert float(tick.get_text()) == pytest.approx(1e-6 * place)
 
 
 @for_each("sections", [[], [0], [1, 19], range(1, 8)])

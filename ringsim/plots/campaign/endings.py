@@ -289,7 +289,7 @@ def tension(campaign: xr.Dataset) -> Figure:
     planes = [p for p in found["plane"].values.tolist() if found.sel(plane=p).notnull().any()]
     figure = Figure(figsize=(8.4, 2.3 * len(planes) + 1.3))
     grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    worst, names = _worst(campaign), ""
+    worst, names, limit = _worst(campaign), "", style.limit_of(campaign, "tension")
     for plane, axes in zip(planes, grid, strict=True):
         own = found.sel(plane=plane).transpose("sample", "span")
         own = own.dropna("span", how="all").dropna("sample", how="all")
@@ -302,6 +302,7 @@ def tension(campaign: xr.Dataset) -> Figure:
             names = f"largest tension: sample {worst}"
             axes.plot(own["span"], own.sel(sample=worst), color=style.INK, linewidth=0.9,
                       linestyle=(0, (3, 1.5)), label=names)  # fmt: skip
+        style.draw_limit(axes, limit, f"limits.tension = {limit:g} N")
         axes.set_title(f"{plane} cable", fontsize=9.5)
         axes.xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     grid[0].set_ylim(bottom=0.0)  # all panels share it
