@@ -127,8 +127,8 @@ def analyse(
     found["part"].attrs = about("share of the samples that have run, the first ones")
     stand = population_of(campaign)
     found = found.assign(statistics(stand, placed)).assign(tail(campaign)).assign(balance(campaign))
-    more = [outcomes(stand, placed), influence(stand, wanted, placed)]
-    more += [worst(stand, wanted)]
+    more = [outcomes(stand, placed), matter := influence(stand, wanted, placed)]
+    more += [worst(stand, wanted, matter)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]
     if reweighted:

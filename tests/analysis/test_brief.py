@@ -75,7 +75,7 @@ def test_a_mean_beside_its_parts_is_told_once():
     # The mean of all goes with it as well, by those four: 0.51 of its ranks.
     assert every.asynchrony_max_rank_correlation.sel(input="mean of friction") > 0.4
     assert named[0] == "pulleys 5 to 8 of friction"
-    assert set(named[1:]) <= {"pulleys 13 to 16 of friction", "friction[13]"}
+    assert set(named[1:]) <= {"pulleys 13 to 16 of friction", "pulley 13 of friction"}
     assert len(named) == 2
 
 

@@ -137,8 +137,8 @@ def in_lines(name: str) -> str:
     name = style.plain(name)
     if len(name) <= WIDE:
         return name
-    # "mean of PATH", and "sections 5 to 8 of PATH".
-    if whole := re.fullmatch(r"(mean of|\w[\w ]* \d+ to \d+ of) (\S+)", name):
+    # "mean of PATH", "section 3 of PATH", and "sections 5 to 8 of PATH".
+    if whole := re.fullmatch(r"(\w[\w ]* of) (\S+)", name):
         return f"{whole[1]}\n{whole[2]}"
     path, bracket, place = name.partition("[")
     # Between the parts of a path rather than within a word.
