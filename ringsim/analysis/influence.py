@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ringsim.analysis import indices
 from ringsim.analysis.design import Drawn, Placement, drawn, endings, short_of_goal, strongest
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
-from ringsim.analysis.intervals import Mask, all_alike, good, lost, numbers, quantities, used
+from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used, varies
 from ringsim.analysis.requirements import Requirement, violations
 from ringsim.analysis.tails import subset_simulation
 from ringsim.refusal import InputError
@@ -177,11 +177,9 @@ def influence(
     index, ok = campaign["sample"].to_numpy(), good(campaign)
     columns, last = indices.Columns(inputs.values), np.ones(len(ok), dtype=bool)
     for name in quantities():
-        if name not in campaign:
-            continue
         values = numbers(campaign, name)
         known = ok & np.isfinite(values)
-        if known.sum() < LEAST or all_alike(values[known].min(), values[known].max()):
+        if known.sum() < LEAST or not varies(campaign, name):
             continue
         if not np.array_equal(known, last):  # most outputs lack the same samples
             columns, last = indices.Columns(inputs.values[known]), known
