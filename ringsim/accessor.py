@@ -179,12 +179,14 @@ class Ring:
         """
         import pandas as pd
 
-        from ringsim.analysis.design import population_of
+        from ringsim.analysis.design import placement, population_of
+        from ringsim.analysis.influence import influence
         from ringsim.analysis.requirements import required_by
         from ringsim.analysis.worst import COLUMNS, command, worst
 
         self._require_samples("worst samples")
-        found = worst(population_of(self._dataset), required_by(self._dataset.attrs))
+        stand, wanted = population_of(self._dataset), required_by(self._dataset.attrs)
+        found = worst(stand, wanted, influence(stand, wanted, placement(self._dataset)))
         columns: dict[str, Any] = {
             name: found[f"worst_{name}"].to_numpy() if found else [] for name in COLUMNS
         }

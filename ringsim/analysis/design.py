@@ -393,9 +393,10 @@ def drawn(campaign: xr.Dataset) -> Drawn:
             continue
         own, values = called(variable), variable.to_numpy()
         if values.dtype.kind in "OUS":
-            words = np.unique(values.astype(str))
+            words, counts = np.unique(values.astype(str), return_counts=True)
             if values.ndim == 1 and len(words) <= _MOST_WORDS:
-                for word in words[: 1 if len(words) == 2 else None]:
+                # Of two the rarer one: "faults = none" says less than the fault.
+                for word in [words[counts.argmin()]] if len(words) == 2 else words:
                     is_so = (values.astype(str) == word).astype(float)
                     found[f"{own} = {word}"] = is_so, "input", own, (0, 0)
         elif values.ndim == 1:
@@ -406,10 +407,10 @@ def drawn(campaign: xr.Dataset) -> Drawn:
             found[f"mean of {own}"] = numbers.mean(axis=1), "mean", own, (0, count)
             for low, high in stretches(count, 4) if count >= _LEAST_QUARTERED else ():
                 mean = numbers[:, low:high].mean(axis=1)
-                name = f"{places_called(variable)} {low + 1} to {high} of {own}"
+                name = f"{place_called(variable)}s {low + 1} to {high} of {own}"
                 found[name] = mean, "quarter", own, (low, high)
-            for k, place in enumerate(place_names(campaign, variable)):
-                found[f"{own}[{place}]"] = numbers[:, k], "place", own, (k, k + 1)
+            for k, place in enumerate(place_names(variable)):
+                found[f"{place} of {own}"] = numbers[:, k], "place", own, (k, k + 1)
     kept: dict[bytes, tuple[list[str], Array, str, tuple[int, int], list[str]]] = {}
     for name, (column, level, own, span) in found.items():
         if np.ptp(column) > 0:
@@ -433,9 +434,9 @@ def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) 
 
     ``places`` are the input of each, its first place and the one behind its last.
 
-    >>> places = {"mean": ("cable", 0, 8), "5 to 8": ("cable", 4, 8), "[1]": ("cable", 0, 1)}
-    >>> strongest(["5 to 8", "mean", "[1]"], places)
-    ['5 to 8', '[1]']
+    >>> places = {"mean": ("cable", 0, 8), "5 to 8": ("cable", 4, 8), "1": ("cable", 0, 1)}
+    >>> strongest(["5 to 8", "mean", "1"], places)
+    ['5 to 8', '1']
     """
     kept = list[str]()
     for name in names:
@@ -446,18 +447,18 @@ def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) 
     return kept
 
 
-def places_called(variable: xr.DataArray) -> str:
-    """What the places of an input are, as "pulleys": of "pulley_of_two_winches", too."""
-    return f"{str(variable.dims[1]).partition('_')[0]}s"
+def place_called(variable: xr.DataArray) -> str:
+    """What a place of an input is, as "pulley": of "pulley_of_two_winches", too."""
+    return str(variable.dims[1]).partition("_")[0]
 
 
-def place_names(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:
-    """Names of the places of an input: those of its coordinate if it has one, else numbers."""
+def place_names(variable: xr.DataArray) -> list[str]:
+    """Names of the places of an input: those of its coordinate if it has one, else "section 3"."""
     (dim,) = variable.dims[1:]
     for name, coordinate in variable.coords.items():
         if coordinate.dims == (dim,) and str(name).endswith("_name"):
-            return [f'"{each}"' for each in coordinate.values]
-    return [str(k + 1) for k in range(variable.sizes[dim])]
+            return [str(each) for each in coordinate.values]
+    return [f"{place_called(variable)} {k + 1}" for k in range(variable.sizes[dim])]
 
 
 # Reading the series of many samples block by block, so that memory does not grow with them.

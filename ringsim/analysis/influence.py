@@ -1,6 +1,6 @@
 """What matters: which inputs go with an output, and which separate failures from successes."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ringsim.analysis import indices
 from ringsim.analysis.design import Drawn, Placement, drawn, endings, short_of_goal, strongest
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
-from ringsim.analysis.intervals import Mask, all_alike, good, lost, numbers, quantities, used
+from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used, varies
 from ringsim.analysis.requirements import Requirement, violations
 from ringsim.analysis.tails import subset_simulation
 from ringsim.refusal import InputError
@@ -177,11 +177,9 @@ def influence(
     index, ok = campaign["sample"].to_numpy(), good(campaign)
     columns, last = indices.Columns(inputs.values), np.ones(len(ok), dtype=bool)
     for name in quantities():
-        if name not in campaign:
-            continue
         values = numbers(campaign, name)
         known = ok & np.isfinite(values)
-        if known.sum() < LEAST or all_alike(values[known].min(), values[known].max()):
+        if known.sum() < LEAST or not varies(campaign, name):
             continue
         if not np.array_equal(known, last):  # most outputs lack the same samples
             columns, last = indices.Columns(inputs.values[known]), known
@@ -239,6 +237,42 @@ def apart(
         ordered = sorted(names, key=lambda name: -plain.get(name, 0.0))
     kept = strongest(ordered, places)
     return [name for name in names if name in kept]
+
+
+def separating(analysis: xr.Dataset, samples: int) -> Iterator[tuple[str, list[int]]]:
+    """The groups of ``influence``, from so many samples, with the inputs that separate each beyond
+    chance, the best first; of inputs that share places only the best.
+    """
+    if "group" not in analysis.dims:
+        return
+    normal = float(scipy.stats.norm.isf(chance_of_each(analysis.sizes["input"]) / 2))
+    places, names = places_in(analysis), analysis["input"].values.astype(str)
+    for group in analysis["group"].values:
+        one = analysis.sel(group=group)
+        middle, ends = one["separation"].values - 0.5, one["separation_interval"].values - 0.5
+        own = one["group_samples"].item()
+        # Variance of the area under the curve without a difference: Mann and Whitney (1947).
+        chance = normal * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
+        order = np.argsort(-np.abs(np.nan_to_num(middle)), kind="stable")
+        order = order[beyond(middle, ends, chance)[order]]
+        kept = strongest(names[order].tolist(), places)
+        yield str(group), [int(k) for k in order if names[k] in kept]
+
+
+def beyond(values: Array, ends: Array, chance: Array | float) -> Mask:
+    """Which values are larger than the largest of all by chance, and if they have intervals leave
+    out zero by these, too.
+    """
+    clear = (ends[:, 0] > 0.0) | (ends[:, 1] < 0.0)
+    return np.asarray((np.abs(values) > chance) & (clear | ~np.isfinite(ends).all(axis=1)))
+
+
+def places_in(analysis: xr.Dataset) -> dict[str, tuple[str, int, int]]:
+    """Of each input whose it is, its first place and the one behind its last."""
+    if "input_of" not in analysis:
+        return {}
+    columns = (analysis[name].values.tolist() for name in ("input", "input_of", "input_span"))
+    return {name: (own, *span) for name, own, span in zip(*columns, strict=True)}
 
 
 def _told(

@@ -1,15 +1,22 @@
 """What matters, as tables: in short only what stands out of chance, then every measure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
-import scipy
 import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import indices
+from ringsim.analysis.design import strongest
 from ringsim.analysis.indices import UNLIKELY
-from ringsim.analysis.influence import apart, confounding_notes, partners
+from ringsim.analysis.influence import (
+    apart,
+    beyond,
+    confounding_notes,
+    partners,
+    places_in,
+    separating,
+)
 from ringsim.analysis.intervals import LEVEL, is_moment, quantities
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
@@ -34,6 +41,7 @@ def influence_tables(analysis: xr.Dataset) -> tuple[Table, ...]:
 
 def _correlations_table(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
+    within = places_in(analysis)
     rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
     named = set[str]()
     for output in _correlated(analysis):
@@ -47,7 +55,7 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         certain = certain or bool(np.isfinite(plain[1]).any())
         used = int(analysis[f"{output}_samples"].values[0])
         least = min(least or used, used)
-        chosen = _largest(plain[0], place)
+        chosen = _largest(plain[0], place, names, within)
         named |= {str(names[k]) for k in chosen}
         rows += [
             (
@@ -79,6 +87,7 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
 
 def _separated(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
+    within = places_in(analysis)
     rows, notes = [], list[str]()
     for group in analysis["group"].values:
         one = analysis.sel(group=group)
@@ -87,8 +96,11 @@ def _separated(analysis: xr.Dataset) -> Table:
             notes.append(f"{first}: the same samples as {', '.join(others)}")
         middle, ends = one["separation"].values, one["separation_interval"].values
         rows += [
-            (f"{first}: {names[k]}", *directed(middle, ends, k), str(one["group_samples"].item()))
-            for k in _largest(middle - 0.5, place)
+            (
+                f"{first}: {names[k]}", *directed(middle, ends, k, word=is_word(names[k], within)),
+                str(one["group_samples"].item()),
+            )
+            for k in _largest(middle - 0.5, place, names, within)
         ]  # fmt: skip
     head = ("what separates", *DIRECTED, "samples")
     return marked(Table(head, rows, notes), analysis)
@@ -98,22 +110,45 @@ DIRECTED = ("compared with the others", "95 % interval")
 """Heads of ``directed``."""
 
 
-def directed(middle: Array, ends: Array, k: int) -> tuple[str, str]:
+def directed(middle: Array, ends: Array, k: int, *, word: bool) -> tuple[str, str]:
     """In what share of pairs, of a sample of the group and one of the rest, an input is larger (or
     smaller) in that of the group, as "larger in 98 % of pairs", and the interval in percent.
+
+    Of a ``word`` that is there or not by how much its share is larger in the group: twice as far
+    from a half, since pairs that are alike count half.
     """
-    word = "larger" if middle[k] >= 0.5 else "smaller"
-    if word == "smaller":
-        middle, ends = 1.0 - middle, 1.0 - ends[:, ::-1]
-    low, high = 100.0 * ends[k]
+    less = middle[k] < 0.5
+    share, (low, high) = middle[k], ends[k]
+    if less:
+        share, low, high = 1.0 - share, 1.0 - high, 1.0 - low
     # Three digits: two would make 1e+02 of 99.6.
-    return f"{word} in {100.0 * middle[k]:.3g} % of pairs", interval_text(low, high, 3)
+    if word:
+        points = f"{200.0 * share - 100.0:.3g} percentage points"
+        told = f"{'less' if less else 'more'} often by {points}"
+        return told, interval_text(200.0 * low - 100.0, 200.0 * high - 100.0, 3)
+    told = f"{'smaller' if less else 'larger'} in {100.0 * share:.3g} % of pairs"
+    return told, interval_text(100.0 * low, 100.0 * high, 3)
 
 
-def _largest(values: Array, place: NDArray[np.bool_]) -> list[int]:
-    """The largest ones of inputs, then of places, among which chance has more."""
+def is_word(name: str, within: Mapping[str, tuple[str, int, int]]) -> bool:
+    """Whether a column says if an input has a certain word, as "net = none"."""
+    own, *span = within.get(name, (name, 0, 0))
+    return span == [0, 0] and name.startswith(f"{own} = ")
+
+
+def _largest(
+    values: Array,
+    place: NDArray[np.bool_],
+    names: Array,
+    within: Mapping[str, tuple[str, int, int]],
+) -> list[int]:
+    """The largest ones of inputs, then of places, among which chance has more; of those that share
+    places the largest alone.
+    """
     size = np.abs(np.where(np.isnan(values), 0.0, values))
     order = np.argsort(-size, kind="stable")
+    kept = strongest(names[order].tolist(), within)
+    order = order[np.isin(names[order], kept)]
     return [int(k) for kind, most in _NAMED.items() for k in order[place[order] == kind][:most]]
 
 
@@ -160,6 +195,7 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
         if dim == "input" and "input_is_place" in analysis
         else np.zeros(analysis.sizes[dim], dtype=bool)
     )
+    within = places_in(analysis) if dim == "input" else {}
     of = "samples" if dim == "input" else "blocks"
     head = ["what explains"]
     for name in names:
@@ -169,6 +205,8 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
         one = analysis.sel(output=output)
         size = np.nan_to_num(one[names[0]].values, nan=-np.inf)
         order = np.argsort(-size, kind="stable")
+        kept = strongest(analysis[dim].values[order].tolist(), within)
+        order = order[np.isin(analysis[dim].values[order], kept)]
         chosen = [k for k in order[~place[order]][:_MOST] if np.isfinite(size[k])]
         chosen += [k for k in order[place[order]][:_MOST_PLACES] if np.isfinite(size[k])]
         named |= {str(analysis[dim].values[k]) for k in chosen}
@@ -368,9 +406,9 @@ def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]
     for output in [n for n in quantities() if n in indexed or n in known] + groups:
         names = list(indexed.get(output, ()))
         if output in known and (output not in indexed or measure in _CHANCE):
-            values, beyond = standing_out(analysis, output)
+            values, listed = standing_out(analysis, output)
             order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
-            ranked = analysis["input"].values[order[beyond[order]]].astype(str).tolist()
+            ranked = analysis["input"].values[order[listed[order]]].astype(str).tolist()
             if output in indexed:
                 size = analysis[measure].sel(output=output).fillna(0.0).to_series().to_dict()
                 ranked.sort(key=size.__getitem__, reverse=True)
@@ -395,10 +433,10 @@ def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[str
         values = one[measure].values
         least = _index_ends(one, measure)[:, 0]
         chance = one[_CHANCE[measure]].values if measure in _CHANCE else 0.0 * values
-        beyond = (values > chance) & (np.where(np.isfinite(least), least, values) > 0.0)
+        listed = (values > chance) & (np.where(np.isfinite(least), least, values) > 0.0)
         if np.isfinite(values).any():
             order = np.argsort(-np.nan_to_num(values))
-            yield output, names[order[beyond[order]]].tolist()
+            yield output, names[order[listed[order]]].tolist()
 
 
 def _index_ends(one: xr.Dataset, measure: str) -> Array:
@@ -445,11 +483,7 @@ def _apart(analysis: xr.Dataset, output: str, found: list[str]) -> list[str]:
     """Of inputs, the largest first, those that do not contain a larger one or lie within it: the
     mean of all pulleys beside that of five of them tells the same twice.
     """
-    if "input_of" not in analysis:
-        return found
-    columns = (analysis[name].values.tolist() for name in ("input", "input_of", "input_span"))
-    places = {name: (own, *span) for name, own, span in zip(*columns, strict=True)}
-    return apart(analysis, output, found, places)
+    return apart(analysis, output, found, places_in(analysis))
 
 
 def _correlated(analysis: xr.Dataset) -> list[str]:
@@ -469,7 +503,7 @@ def standing_out(analysis: xr.Dataset, output: str) -> tuple[Array, NDArray[np.b
     samples = int(analysis[f"{output}_samples"].values[0])
     held = np.where(partial, analysis["inputs_held"].values, 0)
     chance = indices.largest_by_chance(samples, held, len(values))
-    return values, _beyond(values, ends, chance)
+    return values, beyond(values, ends, chance)
 
 
 def _correlations(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ...]:
@@ -494,15 +528,15 @@ def what_separates(analysis: xr.Dataset) -> Table:
     """Inputs that are larger, or smaller, in samples that ended otherwise or violate."""
     if "group" not in analysis.dims:
         return Table((), ())
-    rows = []
-    for group, chosen in _separating(analysis):
+    rows, names, within = [], analysis["input"].values.tolist(), places_in(analysis)
+    for group, chosen in separating(analysis, analysis.attrs["samples_run"]):
         one = analysis.sel(group=group)
         middle, ends = one["separation"].values, one["separation_interval"].values
         first = group.split("; ")[0]
         rows += [
             (
                 f"{first} ({one['group_samples'].item()})" if n == 0 else "",
-                str(analysis["input"].values[k]), *directed(middle, ends, k),
+                names[k], *directed(middle, ends, k, word=is_word(names[k], within)),
             )
             for n, k in enumerate(chosen[:_MOST_IN_SHORT])
         ]  # fmt: skip
@@ -510,31 +544,7 @@ def what_separates(analysis: xr.Dataset) -> Table:
     return marked(Table(head, rows, left=3), analysis, 1)
 
 
-def _separating(analysis: xr.Dataset) -> Iterator[tuple[str, list[int]]]:
-    """The groups of samples with the inputs that separate them beyond chance, the best first."""
-    samples = analysis.attrs["samples_run"]
-    normal = float(scipy.stats.norm.isf(indices.chance_of_each(analysis.sizes["input"]) / 2))
-    for group in analysis["group"].values:
-        one = analysis.sel(group=group)
-        middle, ends = one["separation"].values, one["separation_interval"].values
-        own = one["group_samples"].item()
-        # Variance of the area under the curve without a difference: Mann and Whitney (1947).
-        chance = normal * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
-        beyond = _beyond(middle - 0.5, ends - 0.5, chance)
-        order = np.argsort(-np.abs(np.nan_to_num(middle - 0.5)))
-        yield str(group), order[beyond[order]].tolist()
-
-
 def _separated_groups(analysis: xr.Dataset) -> set[str]:
     """The groups that some input separates, each by all of its names."""
-    if "group" not in analysis.dims:
-        return set()
-    return {group for group, chosen in _separating(analysis) if chosen}
-
-
-def _beyond(values: Array, ends: Array, chance: Array | float) -> NDArray[np.bool_]:
-    """Which values are larger than the largest of all by chance, and if they have intervals leave
-    out zero by these, too.
-    """
-    apart = (ends[:, 0] > 0.0) | (ends[:, 1] < 0.0)
-    return (np.abs(values) > chance) & (apart | ~np.isfinite(ends).all(axis=1))
+    found = separating(analysis, analysis.attrs["samples_run"])
+    return {group for group, chosen in found if chosen}

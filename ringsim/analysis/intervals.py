@@ -424,6 +424,31 @@ def good(campaign: xr.Dataset) -> Mask:
     return np.asarray(campaign.variables["status"].to_numpy() == Status.OK)
 
 
+def varies(campaign: xr.Dataset, name: str) -> bool:
+    """Whether an output differs between samples by more than rounding and its numerical error."""
+    known = np.isfinite(numbers(campaign, name)[good(campaign)]).any()
+    return bool(known) and bool(np.isnan(same_within(campaign, name)))
+
+
+def same_within(campaign: xr.Dataset, name: str) -> float:
+    """The median numerical error of an output if it explains all differences between samples, 0 if
+    rounding does; NaN if they are larger.
+
+    One value suits all samples: their standard deviation is below the median error bar, as Birge,
+    Phys. Rev. 40 (1932) 207 compares scatter with errors, and none is farther from the mean than
+    the largest of so many normal errors (Bonferroni's bound).
+    """
+    own, bars = (numbers(campaign, each)[good(campaign)] for each in (name, f"{name}_error"))
+    own, bars = own[np.isfinite(own)], bars[np.isfinite(bars)]
+    if not len(own) or all_alike(own.min(), own.max()):
+        return 0.0
+    if not len(bars):
+        return np.nan
+    bar, most = float(np.median(bars)), scipy.stats.norm.isf((1 - LEVEL) / 2 / len(own))
+    same = spread(own) < bar and np.abs(own - own.mean()).max() < most * bar
+    return bar if same else np.nan
+
+
 def tells_of(campaign: xr.Dataset, name: str) -> Mask:
     """Which samples tell of a variable: they have a value of it, or ended before what it is about
     happened.  The others reached their goal with a model that does not compute it.

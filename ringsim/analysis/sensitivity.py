@@ -15,7 +15,7 @@ from ringsim.analysis import indices
 from ringsim.analysis.design import Blocks, Placement, blocks_of, drawn, population_of
 from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.influence import groups_of
-from ringsim.analysis.intervals import all_alike, good, lost, numbers, quantities, ran
+from ringsim.analysis.intervals import good, lost, numbers, quantities, ran, varies
 from ringsim.analysis.requirements import Requirement
 from ringsim.stepping.instant import Array
 from ringsim.variables import about
@@ -45,15 +45,17 @@ ABOUT = {
 def responses(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement]
 ) -> dict[str, tuple[Array, str]]:
-    """Outputs that vary, NaN where missing, with units; then failures and violations, 0 or 1."""
+    """Outputs that vary beyond their numerical error, NaN where missing, with units; then failures
+    and violations, 0 or 1.
+    """
     ok, found = good(campaign), dict[str, tuple[Array, str]]()
     # Of blocks the samples whose variance the indices share out.
-    stand = np.isin(campaign["sample"].to_numpy(), population_of(campaign)["sample"].to_numpy())
+    population = population_of(campaign)
+    stand = np.isin(campaign["sample"].to_numpy(), population["sample"].to_numpy())
     for name, variable in quantities().items():
-        values = np.where(ok, numbers(campaign, name), np.nan)
-        known = values[np.isfinite(values)]
-        if len(known) and not all_alike(known.min(), known.max()):
-            found[name] = np.where(np.isfinite(values), values, np.nan), variable.units
+        if varies(population, name):
+            values = numbers(campaign, name)
+            found[name] = np.where(ok & np.isfinite(values), values, np.nan), variable.units
     for name, (own, of) in groups_of(campaign, requirements).items():
         own_drawn, of_drawn = own[stand], of[stand]
         if min(own_drawn.sum(), (of_drawn & ~own_drawn).sum()) >= _LEAST_OF_A_KIND:

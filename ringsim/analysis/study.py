@@ -34,6 +34,7 @@ from ringsim.analysis.intervals import (
     numbers,
     quantities,
     ran,
+    same_within,
     share_interval,
     worst_sample,
 )
@@ -85,9 +86,10 @@ def analyse(
     xarray.Dataset
         For every output NAME ``NAME`` (statistic), ``NAME_interval`` (statistic, bound),
         ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
-        ``NAME_samples`` (counted) and ``NAME_worst_sample``; ``NAME_end_sample`` (bound) with the
-        least and the largest value, and ``NAME_end_error``, what these state as their numerical
-        error; ``NAME_error_samples``, ``NAME_largest_error`` and its sample along ``source``;
+        ``NAME_same_within`` (see ``intervals.same_within``), ``NAME_samples`` (counted) and
+        ``NAME_worst_sample``; ``NAME_end_sample`` (bound) with the least and the largest value, and
+        ``NAME_end_error``, what these state as their numerical error; ``NAME_error_samples``,
+        ``NAME_largest_error`` and its sample along ``source``;
         ``balance_...``, errors of the solution; ``outcome_...`` along ``kind``; verdicts along
         ``requirement``; what matters along ``input`` and ``output``, see ``influence`` and
         ``sensitivity``; the worst samples along ``worst``.  NaN stands for what the samples do not
@@ -127,8 +129,8 @@ def analyse(
     found["part"].attrs = about("share of the samples that have run, the first ones")
     stand = population_of(campaign)
     found = found.assign(statistics(stand, placed)).assign(tail(campaign)).assign(balance(campaign))
-    more = [outcomes(stand, placed), influence(stand, wanted, placed)]
-    more += [worst(stand, wanted)]
+    more = [outcomes(stand, placed), matter := influence(stand, wanted, placed)]
+    more += [worst(stand, wanted, matter)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]
     if reweighted:
@@ -198,6 +200,10 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
         "_error_samples": ("source", errors[:, 1].astype("i8"), "samples that tell it"),
         "_largest_error": ("source", errors[:, 2], "largest error of a sample"),
         "_largest_error_sample": ("source", errors[:, 3].astype("i8"), "sample with that error"),
+        "_same_within": (
+            (), same_within(campaign, name),
+            "numerical error, if it explains all differences between samples",
+        ),
         "_worst_sample": (
             (), worst, "sample with the worst value; -1 where neither end is the worse one",
         ),

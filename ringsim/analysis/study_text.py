@@ -350,9 +350,15 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         mean, deviation, *quantiles, least, most = values
         used, run = counts[0], counts[:3].sum()  # what has not run is the last
         count = str(used) if used == run else f"{used} of {run}"
-        if all_alike(least, most):
-            value = "0" if abs(most) < NOTHING else f"{number_text(most)} {units}".rstrip()
-            alike.append(f"{name} {value}" + f" (in {count})" * int(used < run))
+        within = factor * float(analysis[f"{name}_same_within"])
+        if all_alike(least, most) or np.isfinite(within):
+            middle = (least + most) / 2
+            value = "0" if abs(middle) < NOTHING else f"{number_text(middle)} {units}".rstrip()
+            error = f"{within:.2g} {units}".rstrip()
+            error = f" (differs by less than its error bars, {error})"
+            alike.append(
+                f"{name} {value}{error * (within > 0)}" + f" (in {count})" * int(used < run)
+            )
         elif np.isfinite(least):
             fine = digits_of(least, most)
             low, high = (factor * analysis[f"{name}_interval"].values[0]).tolist()

@@ -1,7 +1,7 @@
 """The worst samples, what is unusual in them, and what lost runs leave open."""
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from ringsim.analysis.design import (
     short_of_goal,
 )
 from ringsim.analysis.indices import UNLIKELY, dependence
+from ringsim.analysis.influence import separating
 from ringsim.analysis.intervals import Mask, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
@@ -30,8 +31,14 @@ from ringsim.variables import about
 # What is unusual in the inputs of a sample, in words.
 
 
-RARE = 0.2
-"""Share of the samples that are as far out, on the same side, up to which a value is unusual."""
+RARE = 0.05
+"""Share of the samples that are as far out, on the same side, up to which a value is unusual: it
+lies outside of the central 90 %.  By chance alone one input of ten is so in a sample; a wider bound
+would name some input of every sample.
+"""
+_SIDE = 1 / 3
+"""The same for an input that separates the failure: beyond this every second sample would have it.
+"""
 _MOST = 3
 """Inputs that are told of a sample."""
 _ROUND_OFF = 1e-9
@@ -39,8 +46,9 @@ _ROUND_OFF = 1e-9
 _ZERO = 273.15
 """0 C in K."""
 NOTE_ON_UNUSUAL = (
-    "unusual inputs are those that at most one sample in five has as far out; in brackets the "
-    "difference from the median of all samples, of temperatures the value in C"
+    "inputs: first those that separate the failure from the other samples, then those that lie "
+    "outside of the central 90 % of all samples; in brackets the difference from the median of all "
+    "samples, of temperatures the value in C"
 )
 
 
@@ -51,41 +59,78 @@ class _Oddity(NamedTuple):
     words: str
 
 
-def unusual(campaign: xr.Dataset, places: list[int]) -> list[str]:
-    """For samples, by their places, the inputs that are farthest out among all samples, at most
-    three: "cold: temperature 235 K (-38 C, the lowest); pulleys 8.3e-4 m (+50 %)".
+def unusual(
+    campaign: xr.Dataset, places: Sequence[int], separating: Sequence[Mapping[str, bool]] = ()
+) -> list[str]:
+    """For samples, by their places, the inputs that tell them from the others, at most three:
+    "cold: temperature 235 K (-38 C, the lowest); mean of pulleys 8.3e-4 m (+50 %)".
+
+    First those that separate the failure, where the sample is on their side; then the inputs that
+    are ``RARE``, the farthest out first.  ``separating`` has for each sample the columns of
+    ``drawn`` that separate its failure, the best first, and whether they are larger there.
 
     Of an input with m places the one that is farthest out among all values counts, with m times
     the share: some place of every sample is far out by chance.  Its mean counts beside.
     """
-    columns = [campaign[name] for name in inputs(campaign)]
-    columns = [each for each in columns if each.attrs.get("path") != "solver.error_bars"]
-    found = []
-    for place in places:
-        odd = [each for variable in columns for each in _odd(campaign, variable, place)]
-        chosen = sorted(odd, key=lambda each: each.share)[:_MOST]
-        found.append("; ".join(each.words for each in chosen) or "nothing unusual")
+    variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
+    variables = {k: v for k, v in variables.items() if v.attrs.get("path") != "solver.error_bars"}
+    columns, found = drawn(campaign), list[str]()
+    for place, sides in zip(places, separating or [{}] * len(places), strict=True):
+        told, named = list[str](), set[str]()
+        for name, larger in sides.items():
+            if name not in columns.names or len(told) == _MOST:
+                continue
+            k = columns.names.index(name)
+            values, variable = columns.values[:, k], variables[columns.input[k]]
+            value = values[place] if larger else -values[place]
+            out = float(np.mean((values if larger else -values) >= value))
+            if variable.name in named or out > (1.0 if _has_words(variable) else _SIDE):
+                continue
+            named.add(str(variable.name))
+            told.append(
+                _word(variable, place)[1] if _has_words(variable)
+                else _told(name, values, float(values[place]), _units(variable))
+            )  # fmt: skip
+        odd = [
+            each for variable in variables.values() if variable.name not in named
+            for each in _odd(variable, place)
+        ]  # fmt: skip
+        told += [each.words for each in sorted(odd, key=lambda each: each.share)]
+        found.append("; ".join(told[:_MOST]) or "nothing unusual")
     return found
 
 
-def _odd(campaign: xr.Dataset, variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
+def _has_words(variable: xr.DataArray) -> bool:
+    return variable.dtype.kind in "OUSb"
+
+
+def _units(variable: xr.DataArray) -> str:
+    return str(variable.attrs.get("units", "1"))
+
+
+def _word(variable: xr.DataArray, sample: int) -> tuple[float, str]:
+    """The share of samples that have the words of one, and these words."""
+    rows = variable.to_numpy().reshape(variable.shape[0], -1).astype(str)
+    alike = int((rows == rows[sample]).all(axis=1).sum())
+    word = ", ".join(dict.fromkeys(rows[sample].tolist()))
+    return alike / len(rows), f"{called(variable)} = {word} (as in {alike} of {len(rows)})"
+
+
+def _odd(variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
     """The oddity of one input in a sample, by its place in the file; none if it is usual."""
-    values, name = variable.to_numpy(), called(variable)
-    if values.dtype.kind in "OUSb":
-        rows = values.reshape(len(values), -1).astype(str)
-        alike = int((rows == rows[sample]).all(axis=1).sum())
-        if alike <= RARE * len(rows):
-            word = ", ".join(dict.fromkeys(rows[sample].tolist()))
-            yield _Oddity(alike / len(rows), f"{name} = {word} (as in {alike} of {len(rows)})")
+    name = called(variable)
+    if _has_words(variable):
+        share, words = _word(variable, sample)
+        if share <= 2.0 * RARE:  # words have no side
+            yield _Oddity(share, words)
         return
-    numbers, odd = values.astype(float), list[_Oddity]()
-    units = str(variable.attrs.get("units", "1"))
+    numbers, odd = variable.to_numpy().astype(float), list[_Oddity]()
     for each, of in (
-        [(numbers, [""])]
+        [(numbers, [name])]
         if numbers.ndim == 1
         else [
-            (numbers, [_place(variable, p) for p in place_names(campaign, variable)]),
-            (numbers.mean(axis=1), ["mean of "]),
+            (numbers, [f"{place} of {name}" for place in place_names(variable)]),
+            (numbers.mean(axis=1), [f"mean of {name}"]),
         ]
     ):
         rows = each.reshape(len(each), -1)
@@ -98,17 +143,10 @@ def _odd(campaign: xr.Dataset, variable: xr.DataArray, sample: int) -> Iterator[
         # Of continuous values one of so many is the farthest, and has none beyond it.
         share = rows.shape[1] * (min(below[k], above[k]) + 1.0 / rows.size)
         if share <= RARE:
-            before, behind = (of[k], "") if of[k].endswith("of ") else ("", of[k])
-            told = _told(f"{before}{name}{behind}", rows, float(rows[sample, k]), units)
+            told = _told(of[k], rows, float(rows[sample, k]), _units(variable))
             odd.append(_Oddity(share, told))
     if odd:
-        yield min(odd)
-
-
-def _place(variable: xr.DataArray, name: str) -> str:
-    """As " of section 3"."""
-    dim = str(variable.dims[1]).replace("_", " ")
-    return f" of {name[1:-1]}" if name.startswith('"') else f" of {dim} {name}"
+        yield min(odd, key=lambda each: each.share)  # of equal ones the place, which moves the mean
 
 
 def _told(name: str, rows: Array, value: float, units: str) -> str:
@@ -145,20 +183,26 @@ class _Failure(NamedTuple):
     """Output that is told of each sample; empty for the reason of its end."""
 
 
-def worst(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> xr.Dataset:
+def worst(
+    campaign: xr.Dataset,
+    requirements: Mapping[str, Requirement],
+    analysis: xr.Dataset | None = None,
+) -> xr.Dataset:
     """The worst samples of each failure along ``worst``, the worst first; empty without failures.
 
     ``worst_failure`` says what failed, with ``worst_failed`` samples of ``worst_of`` that ran; then
     ``worst_sample``, ``worst_found`` (its value, or why it ended) and ``worst_inputs``, what is
     unusual in its inputs.  Violations are ordered by their distance from the bound, those without
     a value last; outcomes by the V-joints that locked, the fewest first; lost runs by how far they
-    came, the shortest first.  InputError if a requirement cannot be judged.
+    came, the shortest first.  ``analysis`` is the ``influence`` of the campaign, whose inputs that
+    separate a failure are named first.  InputError if a requirement cannot be judged.
     """
     for name in requirements:
         require_values(campaign, name)
     # What has not run yet is no sample of which others are told.
     campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
     rows, chosen = list[tuple[str, int, int, str]](), list[int]()
+    sides, every = list[dict[str, bool]](), _sides(analysis, campaign.sizes["sample"])
     for each in _failures(campaign, requirements):
         own = np.flatnonzero(each.own)
         order = own[np.argsort(-each.badness[own], kind="stable")][:MOST]
@@ -166,6 +210,7 @@ def worst(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> xr.D
             told = _found(campaign, each.value, place)
             rows.append((each.words, int(each.own.sum()), campaign.sizes["sample"], told))
             chosen.append(place)
+            sides.append(_of_failure(every, each.words))
     if not rows:
         return xr.Dataset()
     failures, failed, of, found = zip(*rows, strict=True)
@@ -176,11 +221,29 @@ def worst(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> xr.D
         "sample": (campaign["sample"].to_numpy()[chosen], about("one of the worst of them")),
         "found": (np.array(found, dtype=object), {"long_name": "its value, or why it ended"}),
         "inputs": (
-            np.array(unusual(campaign, chosen), dtype=object),
+            np.array(unusual(campaign, chosen, sides), dtype=object),
             {"long_name": "what is unusual in its inputs"},
         ),
     }  # fmt: skip
     return xr.Dataset({f"worst_{name}": ("worst", *each) for name, each in columns.items()})
+
+
+def _sides(analysis: xr.Dataset | None, samples: int) -> dict[str, dict[str, bool]]:
+    """Of each failure by its words the inputs that separate it, and whether they are larger."""
+    found: dict[str, dict[str, bool]] = {}
+    if analysis is None:
+        return found
+    for group, chosen in separating(analysis, samples):
+        one = analysis.sel(group=group)["separation"][chosen]
+        larger = dict(zip(one["input"].values.tolist(), (one.values > 0.5).tolist(), strict=True))
+        found |= dict.fromkeys(group.split("; "), larger)
+    return found
+
+
+def _of_failure(sides: Mapping[str, dict[str, bool]], words: str) -> dict[str, bool]:
+    """What separates a failure of some of these words; all lost runs are one group."""
+    names = [_OF_LOSSES if word.startswith(LOST) else word for word in words.split("; ")]
+    return next((sides[name] for name in names if name in sides), {})
 
 
 def _failures(

@@ -75,7 +75,7 @@ def test_a_mean_beside_its_parts_is_told_once():
     # The mean of all goes with it as well, by those four: 0.51 of its ranks.
     assert every.asynchrony_max_rank_correlation.sel(input="mean of friction") > 0.4
     assert named[0] == "pulleys 5 to 8 of friction"
-    assert set(named[1:]) <= {"pulleys 13 to 16 of friction", "friction[13]"}
+    assert set(named[1:]) <= {"pulleys 13 to 16 of friction", "pulley 13 of friction"}
     assert len(named) == 2
 
 
@@ -101,6 +101,31 @@ def test_what_rounding_leaves_is_no_result():
     table = statistics_table(analyse(made))
     assert [row[0] for row in table.rows] == ["peak_latch_rate", "asynchrony_max"]
     assert table.notes[0] == "the same in all samples: deployment_time 20 s, peak_tension 0"
+
+
+def test_what_differs_by_less_than_its_numerical_error_is_one_value():
+    """Peaks are 40 N with errors of 0.1 N that go with x1, so that indices would name it."""
+    made = drawn_campaign(RandomDesign(samples=400), linear, 3, 4)
+    error = 0.1 * (2 * made["x1"].values - 1)
+    bars = np.where(np.arange(400) % 10 == 0, 0.1, np.nan)  # of one sample in ten
+    made["peak_tension"] = "sample", 40.0 + error, {"units": "N"}
+    made["peak_tension_error"] = "sample", bars, {"units": "N"}
+    one = analyse(made)
+    table, told_of = statistics_table(one), "\n".join(told(one))
+    assert [row[0] for row in table.rows] == ["asynchrony_max"]
+    assert table.notes == [
+        "the same in all samples: peak_tension 40 N (differs by less than its error bars, 0.1 N)"
+    ]
+    assert told_of.count("peak_tension") == 2  # here, and in the error budget
+    assert "peak_tension" not in one.output.values
+    assert "peak_tension_rank_correlation" not in one
+    # Half of that error is less than what is seen, and so is one peak that no error explains.
+    made["peak_tension_error"] = "sample", bars / 2, {"units": "N"}
+    assert "peak_tension" in [row[0] for row in statistics_table(analyse(made)).rows]
+    made["peak_tension"][7] = 40.6
+    made["peak_tension_error"] = "sample", bars, {"units": "N"}
+    assert np.ptp(made["peak_tension"].values[:7]) < 0.2
+    assert np.isnan(analyse(made).peak_tension_same_within)
 
 
 def test_an_output_has_one_row_with_its_statistics(found):

@@ -141,13 +141,13 @@ def test_pulleys_matter_by_mean_and_by_place():
     plain, partial = (
         found[f"asynchrony_max_{each}rank_correlation"].to_series() for each in ("", "partial_")
     )
-    assert plain.idxmax() == 'cables.friction["section 3 V"]'
+    assert plain.idxmax() == "section 3 V of cables.friction"
     assert plain["mean of cables.friction"] > 0.6
     assert plain[both] < -0.1
     assert (partial.drop([both, "mean of cables.friction"]) > 0.7).all()
     ends = found.asynchrony_max_rank_correlation_interval.sel(input=both).values
     assert ends[0] < plain[both] < ends[1] < 0
-    assert any('cables.friction["section 3 V"]' in line for line in told(found, full=True))
+    assert any("section 3 V of cables.friction" in line for line in told(found, full=True))
 
 
 def test_what_is_left_out_is_counted_and_round_off_has_no_inputs():

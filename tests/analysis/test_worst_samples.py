@@ -11,6 +11,7 @@ import xarray as xr
 from made_campaign import made_campaign
 
 from made import campaign
+from ringsim.analysis.influence_text import what_separates
 from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
@@ -91,16 +92,19 @@ def test_what_is_far_out_is_told_in_words() -> None:
         temperature=293.15 + 50.0 * even, friction=places, word=np.array(["a"] * 19 + ["b"]),
         alike=np.full(20, 3.0),
     )  # fmt: skip
-    cold, usual, odd, word = unusual(one, [1, 10, 9, 19])
-    value = 50.0 * (1 - 1 / 9.5) - 0.0
-    assert cold == f"cold: temperature {293.15 - value:.4g} K ({20 - value:+.0f} C)"
+    cold, second, usual, odd, word = unusual(one, [0, 1, 10, 9, 19])
+    assert cold == (
+        "cold: temperature 243.1 K (-30 C, the lowest); "
+        "section 1 of friction 0.00099 m (-1 %, the lowest)"
+    )
+    assert second == "nothing unusual"  # one of ten is as cold
     assert usual == "nothing unusual"
-    assert odd == "friction of section 4 0.0015 m (+50 %, the highest)"
+    assert odd == "section 4 of friction 0.0015 m (+50 %, the highest)"
     assert "word = b (as in 1 of 20)" in word
     assert "hot: temperature 343.1 K (+70 C, the highest)" in word
 
 
-def test_chance_makes_one_sample_in_five_unusual_on_either_side() -> None:
+def test_chance_makes_one_sample_in_ten_unusual() -> None:
     """Also of many places: some place is always far out."""
     random = np.random.default_rng(3)
     values = random.random((1000, 17))
@@ -110,10 +114,51 @@ def test_chance_makes_one_sample_in_five_unusual_on_either_side() -> None:
     shares = [np.mean(np.array(unusual(one, [*range(1000)])) != "nothing unusual")]
     one = one.drop_vars("single").assign(many=(("sample", "section"), values, says))
     far = np.array(unusual(one, [*range(1000)]))
-    # Places alone: 1 - (1 - 0.4 / 17)^17 = 0.33; with the mean, which goes with them, more.
-    shares.append(np.mean([each.startswith("a of section") for each in far]))
-    assert shares[0] == pytest.approx(0.4, abs=0.002)
-    assert 0.2 < shares[1] < 0.4
+    # Places alone: 1 - (1 - 0.1 / 17)^17 = 0.095; with the mean, which goes with them, more.
+    shares.append(np.mean([each.startswith("section ") for each in far]))
+    assert shares[0] == pytest.approx(0.1, abs=0.002)
+    assert 0.06 < shares[1] < 0.1
+
+
+def stalled_by(stuck: np.ndarray, cold: np.ndarray, noise: np.ndarray) -> xr.Dataset:
+    """A campaign whose stuck or cold samples stall, among inputs that do nothing."""
+    stalls = stuck | (cold < 240.0)
+    outcome = np.where(stalls, Fate.STALLED, Fate.DEPLOYED)
+    one = campaign(np.full(len(stuck), 5.0), outcome=outcome,
+                   locked_joints=np.full(len(stuck), 3))  # fmt: skip
+    for name, values, units in (
+        ("faults", np.where(stuck, "stuck-vjoint", "none"), "1"),
+        ("temperature", cold, "K"),
+        *((f"noise{k}", column, "m") for k, column in enumerate(noise.T)),
+    ):
+        one[name] = "sample", values, {"role": "input", "path": name, "units": units}
+    return one
+
+
+def test_what_separates_the_failures_is_named_first_however_common_it_is() -> None:
+    """A quarter of the samples has the fault that all stalled ones have."""
+    random = np.random.default_rng(1)
+    stuck = np.arange(100) % 4 == 0
+    one = stalled_by(stuck, np.full(100, 293.0), random.random((100, 5)))
+    rows = analyse(one).worst_inputs.values.tolist()
+    assert len(rows) == 3
+    assert all(row.startswith("faults = stuck-vjoint (as in 25 of 100)") for row in rows)
+    # On its own it is not rare, and without the analysis nobody knows what separates.
+    assert not any("faults" in row for row in worst(one, {}).worst_inputs.values)
+    ((_, name, told, _),) = what_separates(analyse(one)).rows
+    assert (name, told) == ("faults = stuck-vjoint", "more often by 100 percentage points")
+
+
+def test_a_sample_on_the_other_side_is_not_told_by_what_separates_the_rest() -> None:
+    random = np.random.default_rng(2)
+    stuck, cold = np.arange(400) % 40 == 0, 225.0 + 100.0 * random.random(400)
+    cold[0] = 300.0  # of the stuck ones this one is warm
+    one = stalled_by(stuck, cold, random.random((400, 2)))
+    one["locked_joints"][0] = 0  # and the worst of all
+    first, *others = analyse(one).worst_inputs.values.tolist()
+    assert "temperature" not in first
+    assert "faults = stuck-vjoint (as in 10 of 400)" in first
+    assert all(row.startswith("cold: temperature") for row in others)
 
 
 def test_analysis_and_accessor_tell_the_same_and_how_to_run_them() -> None:

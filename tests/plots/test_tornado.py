@@ -150,3 +150,11 @@ def test_each_main_number_has_the_measure_that_it_allows_and_no_panel_is_empty()
     assert found["deployment_time"].names == ["force"]
     assert found["deployment_time"].values.tolist() == [pytest.approx(1.0)]
     assert all(len(axes.patches) for axes in tornado(campaign).axes)
+
+
+def test_what_differs_by_less_than_its_numerical_error_has_no_sheet() -> None:
+    one = made(RandomDesign(samples=200))
+    assert explained(one)
+    one["peak_tension_error"] = "sample", np.full(200, 5.0), {"units": "N"}
+    assert not explained(one)
+    assert [*bars_of(one)] == []

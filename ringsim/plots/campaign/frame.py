@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.courses import QUANTILES
 from ringsim.analysis.design import population_of, scalars, values_of
-from ringsim.analysis.intervals import quantities
+from ringsim.analysis.intervals import quantities, varies
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import losses
 from ringsim.plots import style
@@ -98,10 +98,14 @@ def shown(campaign: xr.Dataset, most: int = MOST_PANELS) -> tuple[list[str], str
     ]  # fmt: skip
     known = {name: values_of(campaign, name)[1] for name in names}
     several = [name for name in names if name not in limited and len(known[name]) > 1]
-    flat = [name for name in several if np.ptp(known[name]) < _APART * np.abs(known[name]).max()]
+    flat = [
+        name for name in several
+        if np.ptp(known[name]) < _APART * np.abs(known[name]).max() or not varies(campaign, name)
+    ]  # fmt: skip
     told = ""
     if flat and len(flat) < len(names):
-        told = f" The same in all samples within {100 * _APART:g} %: {', '.join(flat)}."
+        within = f"{100 * _APART:g} % or the numerical error"
+        told = f" The same in all samples within {within}: {', '.join(flat)}."
         names = [name for name in names if name not in flat]
     if len(names) > most:
         names.sort(key=lambda name: name not in limited)
@@ -137,8 +141,8 @@ def in_lines(name: str) -> str:
     name = style.plain(name)
     if len(name) <= WIDE:
         return name
-    # "mean of PATH", and "sections 5 to 8 of PATH".
-    if whole := re.fullmatch(r"(mean of|\w[\w ]* \d+ to \d+ of) (\S+)", name):
+    # "mean of PATH", "section 3 of PATH", and "sections 5 to 8 of PATH".
+    if whole := re.fullmatch(r"(\w[\w ]* of) (\S+)", name):
         return f"{whole[1]}\n{whole[2]}"
     path, bracket, place = name.partition("[")
     # Between the parts of a path rather than within a word.

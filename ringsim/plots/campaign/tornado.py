@@ -27,7 +27,7 @@ from ringsim.analysis.design import (
 from ringsim.analysis.indices import UNLIKELY, largest_by_chance
 from ringsim.analysis.influence import LEAST, influence
 from ringsim.analysis.influence_text import mattering
-from ringsim.analysis.intervals import quantities, ran
+from ringsim.analysis.intervals import quantities, ran, varies
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
@@ -184,8 +184,11 @@ def explained(campaign: xr.Dataset) -> bool:
 
     Told without the analysis itself, which takes a while for many samples.
     """
-    known = [values_of(campaign, name)[1] for name in scalars(campaign)]
-    varied = any(len(values) >= LEAST and np.ptp(values) > 0 for values in known)
+    stand = population_of(campaign)
+    varied = any(
+        len(values_of(stand, name)[1]) >= LEAST and varies(stand, name)
+        for name in scalars(campaign)
+    )
     return varied and bool(drawn(campaign).names) and subset_simulation(campaign.attrs) is None
 
 
