@@ -167,7 +167,7 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     at = cells.index("deployed")
     low, high = share_interval(4, 7)[0], share_interval(6, 7)[1]
     assert cells[at + 1 : at + 4] == [
-        "4 of 7 (2 lost)", f"{4 / 7:.4g}", f"{low:.4g} .. {high:.4g}"
+        "4 of 7 (2 lost)", f"{4 / 7:.2f}", f"{low:.2f} .. {high:.2f}"
     ]  # fmt: skip
     at = cells.index("outcome is deployed")
     assert cells[at + 6 : at + 9] == ["5", "1", "2"]
