@@ -78,6 +78,7 @@ def random_scene(seed: int) -> Scene:
         "net": "none",
         "record.stress": bool(rng.random() < 0.7),
         "record.interval": 0.05,
+        "record.reactions": True,
         "solver.tolerance": log_uniform(rng, 1e-3 if large and cables else 3e-4, 3e-3),
     }
     if not closed:

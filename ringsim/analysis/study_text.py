@@ -253,7 +253,7 @@ def not_met(analysis: xr.Dataset) -> list[str]:
 
 def verdict_table(analysis: xr.Dataset) -> Table:
     """The verdicts, a row a requirement; no rows without requirements."""
-    rows, notes = [], [_DECIDES] * ("requirement" in analysis.dims)
+    rows, notes = [], [_DECIDES] * bool(analysis.sizes.get("requirement"))
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         one = {str(n): v.item() for n, v in analysis.sel(requirement=name).items() if not v.dims}
         verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])

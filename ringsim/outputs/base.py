@@ -5,7 +5,16 @@ import math
 import numpy as np
 
 from ringsim.layout.layout import layout_of
-from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import (
+    Array,
+    ErrorBar,
+    Output,
+    Reading,
+    Run,
+    Series,
+    Values,
+    Variable,
+)
 from ringsim.parts.solver import LEAST_TOLERANCE
 from ringsim.stepping.locks import history
 
@@ -30,10 +39,12 @@ class BaseReaction(Output):
         ),
         Variable(
             "peak_base_force", (), "N", "largest force at the base at any step",
+            error_bar=ErrorBar("largest base force", safety=1.9),
             summary=("largest base force", "10.3g"), worse="larger", largest_of="base_force",
         ),
         Variable(
             "peak_base_torque", (), "N m", "largest torque at the base at any step",
+            error_bar=ErrorBar("largest base torque", safety=3.4),
             summary=("largest base torque", "10.3g"), worse="larger", largest_of="base_torque",
         ),
     )  # fmt: skip

@@ -209,6 +209,7 @@ class Latching(Output):
         Variable(
             "least_latch_rate", (), "rad/s",
             "smallest opening rate at which a V-joint first met its latch",
+            error_bar=ErrorBar("least latch rate", safety=3.0),
             summary=("least latch rate", "10.3g"), worse="smaller", least_of="latch_rate",
         ),
         *LEAST.variables,
@@ -243,6 +244,7 @@ class FastestLatch(Output):
         Variable(
             "peak_latch_rate", (), "rad/s",
             "largest opening rate at which a V-joint first met its latch; missing if none did",
+            error_bar=ErrorBar("largest latch rate", safety=1.7),
             summary=("largest latch rate", "10.3g"), worse="larger", largest_of="latch_rate",
         ),
         *LARGEST.variables,
@@ -295,6 +297,7 @@ class LockImpulse(Output):
         Variable(
             "peak_lock_impulse", (), "N m s",
             "largest angular impulse of a stop at a lock; missing if no V-joint has locked",
+            error_bar=ErrorBar("largest lock impulse", safety=1.8),
             summary=("largest lock impulse", "10.3g"), worse="larger", largest_of="lock_impulse",
         ),
     )  # fmt: skip

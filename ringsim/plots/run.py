@@ -28,8 +28,9 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
     Each plane has a column, and colour counts the sections; ``lock_time`` and ``deployment_time``
     are marked where they are known.
     """
-    angle = _to_the_end(dataset, dataset["opening_angle"].dropna("time", how="all"), 180.0)
-    deviation = _to_the_end(dataset, deviations(dataset), 0.0)
+    final = float(dataset.get("final_time", math.nan))
+    angle = _locked(dataset, dataset["opening_angle"].dropna("time", how="all"), 180.0, final)
+    deviation = _locked(dataset, deviations(dataset), 0.0)
     planes, sections = dataset["plane"].values.tolist(), dataset["section"]
     figure = Figure(figsize=(5.2 * len(planes) + 0.6, 6.4))
     grid = figure.subplots(
@@ -54,10 +55,15 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def _to_the_end(dataset: xr.Dataset, values: xr.DataArray, last: float) -> xr.DataArray:
-    """A course with what a ring has that has deployed behind the last record."""
-    deployed, final = style.locked_time(dataset), float(dataset.get("final_time", math.nan))
-    times = [t for t in (deployed, max(deployed, final)) if t > float(values["time"][-1])]
+def _locked(
+    dataset: xr.Dataset, values: xr.DataArray, last: float, *later: float
+) -> xr.DataArray:  # fmt: skip
+    """A course with what a deployed ring has behind the last record: at its deployment time, and
+    at later ones.
+    """
+    deployed = style.locked_time(dataset)
+    times = (deployed, *later) if math.isfinite(deployed) else ()
+    times = tuple(t for t in times if t > float(values["time"][-1]))
     more = [xr.full_like(values[..., -1:], last).assign_coords(time=[t]) for t in times]
     return xr.concat([values, *more], "time") if more else values
 
@@ -123,7 +129,7 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     values = dataset["asynchrony"].dropna("time")
     moving = values[~(values["time"].values > style.deployment_time(dataset))]
     end = float(moving["time"][-1])
-    moving = _to_the_end(dataset, moving, 0.0)
+    moving = _locked(dataset, moving, 0.0)
     peak = peak_of(dataset, "asynchrony", "asynchrony_max", end)
     times, heights = peak.within(moving)
     figure = Figure(figsize=(10.2, 4.3))

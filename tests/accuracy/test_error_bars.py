@@ -227,6 +227,24 @@ def test_bars_cover_what_a_finer_run_finds() -> None:
         assert error < barred[f"{name}_error"] < 0.05 * truth[name]
 
 
+def test_bars_of_what_locks_do_cover_what_finer_steps_find() -> None:
+    fields = {
+        "structure.sections": 4, "boom.base": "fixed", "record.reactions": True,
+        "solver.error_bars": True,
+    }  # fmt: skip
+    scene = load_scene("ring18-cable").with_values(fields)
+    one, other = (
+        run_frame(scene.with_values({"solver.tolerance": tolerance})).values
+        for tolerance in (3e-3, 3e-4)
+    )
+    for name in (
+        "least_latch_rate", "peak_latch_rate", "peak_lock_impulse", "peak_base_force",
+        "peak_base_torque",
+    ):  # fmt: skip
+        apart = abs(float(one[name] - other[name]))
+        assert apart <= float(one[f"{name}_error"] + other[f"{name}_error"]), name
+
+
 FILE = """
 name = "some"
 scene = "ring18"

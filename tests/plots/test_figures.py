@@ -128,14 +128,16 @@ def test_every_section_of_both_planes_has_its_line(drawn, deployed):
             assert segment[-1].tolist() == [float(deployed.final_time), 180.0]
 
 
-def test_courses_of_a_deployed_ring_go_on_behind_its_last_record(deployed):
+def test_courses_of_a_deployed_ring_go_on_behind_its_last_record(deployed, failed):
     run = deployed.isel(time=slice(0, 170))  # up to 16.9 s
     for axes, last in zip(opening_angles(run).axes[:4], (180.0, 180.0, 0.0, 0.0), strict=True):
         for segment in axes.collections[0].get_segments():
-            assert segment[-2:, 0].tolist() == [float(run.deployment_time), float(run.final_time)]
-            assert segment[-2:, 1].tolist() == [last, last]
+            times = [float(run.deployment_time), *[float(run.final_time)] * (last > 0.0)]
+            assert segment[-len(times) :].tolist() == [[time, last] for time in times]
+    for segment in opening_angles(failed).axes[0].collections[0].get_segments():
+        assert segment[-1, 0] < float(failed.final_time)
     (line,) = (line for line in asynchrony(run).axes[0].lines if len(line.get_xdata()) > 2)
-    assert line.get_xydata()[-2].tolist() == [float(run.deployment_time), 0.0]
+    assert line.get_xydata()[-1].tolist() == [float(run.deployment_time), 0.0]
 
 
 def test_deviations_add_up_to_nothing(drawn):
