@@ -88,8 +88,7 @@ def test_one_failed_reference_costs_certainty_only(name, label, study):
     assert own > whole.uncertainty.sel(output="deployment_time")
     assert error(found) <= float(own)
     assert (
-        "ended as timeout: took too long; the reference is made of other runs"
-        in (found.attrs["remarks"])
+        "ended as timeout: took too long; other runs form the reference" in (found.attrs["remarks"])
     )
     assert found.attrs["remarks"] in tables(found, "A study")
 
@@ -137,7 +136,7 @@ def test_frames_alone_are_their_own_reference(study):
     found = study([], fidelity="frame")
     assert set(found.fidelity.values) == {"frame"}
     assert error(found) < 1e-8
-    assert "the reference is its own limit" in tables(found, "A study")
+    assert "the reference is the limit of its own fine steps" in tables(found, "A study")
     with pytest.raises(ReferenceRunError, match="more time"):
         study([rung("steps", "x 1/4")], fidelity="frame")
 
