@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from decimal import Decimal
 from typing import NamedTuple
 
 from tabulate import DataRow, TableFormat, tabulate
@@ -70,15 +71,45 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" + "s" * (number != 1)
 
 
+def known_to(
+    number: str, error: float, form: str = ".2g", exact: float | None = None
+) -> str:  # fmt: skip
+    """A number in words without the digits beyond those that its error has in print, two at most;
+    rounded once where it is known ``exact``.
+
+    >>> known_to("32.4713", 0.02), known_to("32.4713", 0.023), known_to("1234", 170.0)
+    ('32.47', '32.471', '1230')
+    >>> known_to("3.2", 0.001), known_to("3.2", math.nan)
+    ('3.2', '3.2')
+    """
+    if not (math.isfinite(error) and error > 0.0) or number == "-":
+        return number
+    bar, held = Decimal(f"{error:{form}}"), Decimal(number)
+    own, last = (each.adjusted() - len(each.as_tuple().digits) + 1 for each in (held, bar))
+    if own >= last:
+        return number
+    return f"{Decimal(number if exact is None else exact).quantize(Decimal((0, (1,), last))):f}"
+
+
 def number_text(value: float, digits: int = 4) -> str:
     """A number with so many digits, or a dash."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def interval_text(low: float, high: float, digits: int = 4) -> str:
-    """Both ends of an interval, or a dash."""
-    known = math.isfinite(low) or math.isfinite(high)
-    return f"{number_text(low, digits)} .. {number_text(high, digits)}" if known else "-"
+    """Both ends of an interval without digits beyond its half, or a dash.
+
+    >>> interval_text(6.4463, 6.7259), interval_text(1.0, math.inf)
+    ('6.45 .. 6.73', '1 .. -')
+    """
+    if not (math.isfinite(low) or math.isfinite(high)):
+        return "-"
+    return " .. ".join(estimate_text(end, low, high, digits) for end in (low, high))
+
+
+def estimate_text(value: float, low: float, high: float, digits: int = 4) -> str:
+    """An estimate to two digits of half of its interval."""
+    return known_to(number_text(value, digits), 0.5 * (high - low), ".1e", value)
 
 
 def size_text(size: float) -> str:
@@ -104,12 +135,30 @@ def unit_text(units: str) -> str:
     return "" if units == "1" else units
 
 
+def readable(units: str, largest: float) -> tuple[float, str]:
+    """Factor and unit in which people read numbers of an SI unit up to a size; files hold SI.
+
+    >>> readable("Pa", 3e7), readable("Pa", 1.2e11), readable("N", 3e7)
+    ((1e-06, 'MPa'), (1e-09, 'GPa'), (1.0, 'N'))
+    """
+    if units != "Pa":
+        return 1.0, units
+    return (1e-9, "GPa") if abs(largest) >= _GIGA else (1e-6, "MPa")
+
+
+_GIGA = 1e10
+"""Pascal from which on these are moduli and not stresses."""
+
+
 def with_unit(number: str, units: str) -> str:
     """A number in words and its unit.
 
-    >>> with_unit("3.2", "N"), with_unit("3.2", "1")
-    ('3.2 N', '3.2')
+    >>> with_unit("3.2", "N"), with_unit("3.2", "1"), with_unit("+3.018e+07", "Pa")
+    ('3.2 N', '3.2', '+30.18 MPa')
     """
+    if units == "Pa" and number != "-":
+        factor, units = readable(units, float(number))
+        number = f"{factor * float(number):{'+' * number.startswith('+')}.6g}"
     return f"{number} {unit_text(units)}".rstrip()
 
 

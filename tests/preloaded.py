@@ -1,8 +1,8 @@
 """Commands of ringsim without the two seconds that each process would spend on imports.
 
-A process that has loaded all modules forks for each command.  Folder, environment, exit code and
-what is printed are those of a fresh process.  Tests of how a process starts, of what it loads, of
-signals and of MPI start real ones.
+A process that has loaded all modules forks for each command, and a command forks its solver
+processes.  Folder, environment, exit code and what is printed are those of a fresh process.  Tests
+of how a process starts, of what it loads, of signals and of MPI start real ones.
 """
 
 from __future__ import annotations
@@ -21,8 +21,12 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import IO
 
 LOADED = ("netCDF4", "scipy.stats", "xarray")
 """Loaded before ringsim's own modules: what most commands need beside these."""
@@ -86,16 +90,16 @@ def _serve() -> None:
         order = json.loads(line)
         if (child := os.fork()) == 0:
             _become(order)
-            _run()
+            _run(lambda: runpy.run_module("ringsim", run_name="__main__", alter_sys=True))
         print(child, flush=True)
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 
 
-def _run() -> None:
-    """Run the command, and leave without the half second that taking all modules down costs."""
+def _run(main: Callable[[], object]) -> None:
+    """Run it, and leave without the half second that taking all modules down costs."""
     code = 1
     try:
-        runpy.run_module("ringsim", run_name="__main__", alter_sys=True)
+        main()
     except SystemExit as left:
         code = left.code if isinstance(left.code, int) else 0
     except BaseException:
@@ -124,6 +128,58 @@ def _become(order: dict[str, object]) -> None:
     rest = [path for path in sys.path[1:] if path not in paths]
     sys.path[:] = [os.getcwd(), *paths, *rest]
     sys.argv = ["ringsim", *order["arguments"]]
+    slot = importlib.import_module("ringsim.execution.slot")
+    names = {"DEVNULL": subprocess.DEVNULL, "TimeoutExpired": subprocess.TimeoutExpired}
+    slot.__dict__["subprocess"] = SimpleNamespace(Popen=_Solver, **names)
+
+
+class _Solver:
+    """A solver process as ``subprocess.Popen`` would start it, to what it is asked."""
+
+    def __init__(
+        self, command: list[str], *, stdin: int, stdout: IO[bytes], stderr: IO[bytes], cwd: str,
+        env: dict[str, str], pass_fds: list[int], start_new_session: bool,
+    ) -> None:  # fmt: skip
+        if not os.access(command[0], os.X_OK):
+            raise FileNotFoundError(command[0])
+        sys.stdout.flush()
+        sys.stderr.flush()
+        self.pid, self.code = os.fork(), list[int]()
+        if self.pid:
+            return
+        assert start_new_session
+        os.setsid()
+        os.chdir(cwd)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        for source, target in ((stdout, 1), (stderr, 2)):
+            os.dup2(source.fileno(), target)
+        (kept,) = pass_fds
+        os.closerange(3, kept)
+        os.closerange(kept + 1, 1 << 16)
+        os.environ.clear()
+        os.environ.update(env)
+        for number in (signal.SIGTERM, signal.SIGALRM):
+            signal.signal(number, signal.SIG_DFL)
+        for stream in (sys.stdout, sys.stderr):
+            stream.reconfigure(write_through=True)
+        module = command.index("-m") + 1
+        sys.argv = command[module:]
+        _run(importlib.import_module(command[module]).main)
+
+    def wait(self, timeout: float) -> int:
+        end = time.monotonic() + timeout
+        while not self.code:
+            found, status = os.waitpid(self.pid, os.WNOHANG)
+            if found:
+                self.code.append(os.waitstatus_to_exitcode(status))
+            elif time.monotonic() >= end:
+                raise subprocess.TimeoutExpired(str(self.pid), timeout)
+            else:
+                time.sleep(0.002)
+        return self.code[0]
+
+    def send_signal(self, number: int) -> None:
+        os.kill(self.pid, number)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from ringsim.analysis.intervals import good, used, worst_sample
 from ringsim.analysis.worst import losses
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
-from ringsim.tables import counted, with_unit
+from ringsim.tables import counted, known_to, readable, with_unit
 from ringsim.variables import Variable
 
 _NAMED = 6
@@ -140,11 +140,14 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
             if output().told(values, spans):
                 # Series tell which places are alike.
                 values = {str(n): each.values for n, each in worst.variables.items()}
-                told = " ".join(summary(values, spans)[variable.name].split())
-                error = _numerical(sound, variable, worst) if variable.error_bar else ""
-                unknown |= error is None
-                error = error or ""
-                lines.append(f"{variable.summary[0]} in sample {sample}: {told}{error}{mark}")
+                number, *told = summary(values, spans)[variable.name].split()
+                error = ""
+                if variable.error_bar and "+-" not in told:
+                    bar, error = _of_others(sound, variable)
+                    unknown |= not error
+                    number = known_to(number, readable(variable.units, bar)[0] * bar)
+                said = " ".join([number, *told])
+                lines.append(f"{variable.summary[0]} in sample {sample}: {said}{error}{mark}")
     if unknown:
         lines.append(
             "no sample has numerical error bars: set error_bars_every in the campaign file, or "
@@ -153,18 +156,17 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
     return lines
 
 
-def _numerical(sound: xr.Dataset, variable: Variable, worst: xr.Dataset) -> str | None:
-    """How large the numerical error of other samples' values is if this one does not state its own,
-    which stands behind its value; None if no sample tells.
+def _of_others(sound: xr.Dataset, variable: Variable) -> tuple[float, str]:
+    """How large the numerical error of other samples' values is, and that in words; NaN and nothing
+    if no sample tells.
     """
     if (name := f"{variable.name}_error") not in sound or not sound[name].notnull().any():
-        return None
-    if np.isfinite(float(worst[name])):
-        return ""
+        return np.nan, ""
     stated = sound[name].dropna("sample")
     units = "deg" if variable.units == "degree" else variable.units
-    most = with_unit(f"{float(stated.max()):.2g}", units)
-    return (
+    largest = float(stated.max())
+    most = with_unit(f"{largest:.2g}", units)
+    return largest, (
         f"; this sample has no error bar, the {counted(stated.size, 'sample')} that have one are "
         f"within {most}"
     )

@@ -8,7 +8,17 @@ import xarray as xr
 from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section, digits_of
 from ringsim.analysis.worst import NOTE, marked
-from ringsim.tables import Table, counted, interval_text, number_text, slim, unit_text, with_unit
+from ringsim.tables import (
+    Table,
+    counted,
+    estimate_text,
+    interval_text,
+    number_text,
+    readable,
+    slim,
+    unit_text,
+)
+from ringsim.variables import Fate
 
 _NAMED = 20
 """Changed outcomes, and values of scenes, that are listed at most."""
@@ -41,7 +51,22 @@ def head_lines(found: xr.Dataset) -> list[str]:
             told = f" ({found.attrs[f'{side}_name']})" if title and name != side else ""
             lines.append(f"{side}: {title or found.attrs[f'{side}_name']}{told}")
     lines.append(f"{found.attrs['pairing']}{pairs}")
-    return [*lines, *filter(None, [found.attrs[NOTE], found.attrs["intervals"]])]
+    return [*lines, *filter(None, [found.attrs[NOTE], found.attrs["intervals"]]), *_cut_off(found)]
+
+
+def _cut_off(found: xr.Dataset) -> Iterator[str]:
+    """What the samples that ended before their antenna came to rest mean for the numbers."""
+    word = Fate.CUT_OFF.words
+    if found.attrs["runs"] or word not in found["kind"].values:
+        return
+    counts = found["kind_samples"].sel(kind=word).values.tolist()
+    for side, name, count in zip(("first", "second"), names_of(found), counts, strict=True):
+        if count:
+            samples = f"{count} of {counted(found.attrs[f'{side}_samples'], 'sample')}"
+            yield (
+                f"{name}: solver.end_time cut off {samples}: what grows with time counts with what "
+                "it was by then, so that it is at least as large"
+            )
 
 
 def names_of(found: xr.Dataset) -> tuple[str, str]:
@@ -93,7 +118,7 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
         else:
             cells = [str(count) for count in counts]
         low, high = one[f"{word}_share_difference_interval"].tolist()
-        apart = number_text(one[f"{word}_share_difference"].item(), 3)
+        apart = estimate_text(one[f"{word}_share_difference"].item(), low, high, 3)
         rows.append((str(name), *cells, apart, interval_text(low, high, 3)))
     heads = (head, *names_of(found), "difference", "95 % interval")
     columns = 3 if single else len(heads)
@@ -126,24 +151,28 @@ def _outputs(found: xr.Dataset) -> Table:
         first, second = found[f"{name}_mean"].values
         if np.isnan(first) and not found.attrs["pairs"]:
             continue
-        apart = found[f"{name}_difference"].item()
+        factor, unit = readable(variable.units, max(abs(first), abs(second)))
+        first, second = factor * first, factor * second
+        apart = factor * found[f"{name}_difference"].item()
+        low, high = factor * found[f"{name}_difference_interval"].values
         counts = found[f"{name}_samples"].values.tolist()
         largest, place = "-", "-"
         if f"{name}_largest_difference" in found:
-            most = found[f"{name}_largest_difference"].item()
+            most = factor * found[f"{name}_largest_difference"].item()
             if all_alike(*sorted((first, second))) and all_alike(*sorted((first, first + most))):
                 value = number_text(first) if abs(first) > NOTHING else "0"
                 # Of pairs it is a mean, which need not be the value of any.
-                told = f" {with_unit(value, variable.units)}" * bool(found.attrs["runs"])
+                told = f" {value} {unit_text(unit)}".rstrip() * bool(found.attrs["runs"])
                 alike.append(f"{name}{told}")
                 continue
             largest = number_text(most)
             place = str(found[f"{name}_largest_difference_sample"].item())
         fine = digits_of(min(first, second), max(first, second))
         rows.append((
-            name, unit_text(variable.units), number_text(first, fine), number_text(second, fine),
-            number_text(apart), _percent(first, second) if variable.badness else "-",
-            interval_text(*found[f"{name}_difference_interval"].values.tolist()),
+            name, unit_text(unit),
+            *(estimate_text(mean, low, high, fine) for mean in (first, second)),
+            estimate_text(apart, low, high), _percent(first, second) if variable.badness else "-",
+            interval_text(low, high),
             _worse(found, name),
             str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
             largest, place,

@@ -315,7 +315,7 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
             if of[first].any():
                 shares[k, part] = own[first].sum() / of[first].sum()
         ends[k] = [
-            _share_interval(each[of], index[of], placed)[side]
+            placed_share_interval(each[of], index[of], placed)[side]
             for side, each in enumerate((own, most))
         ]
     counts = [(own.sum(), most.sum() - own.sum()) for own, most in rows.values()]
@@ -349,7 +349,7 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
     )  # fmt: skip
 
 
-def _share_interval(
+def placed_share_interval(
     own: NDArray[np.bool_], samples: NDArray[np.int64], placed: Placement
 ) -> Interval:
     """Interval of a share as the design allows it."""

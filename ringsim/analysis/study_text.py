@@ -40,11 +40,12 @@ from ringsim.refusal import InputError
 from ringsim.tables import (
     Table,
     counted,
+    estimate_text,
     interval_text,
     number_text,
+    readable,
     slim,
     unit_text,
-    with_unit,
 )
 
 # Estimates for other distributions of inputs, as lines for people.
@@ -66,7 +67,7 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
         f"worth {number_text(analysis['effective_samples'].item(), 3)} effective ones"
     ])  # fmt: skip
     rows, shares, thin = [], [], False
-    for name, variable in quantities().items():
+    for name in quantities():
         if f"{name}_reweighted" not in analysis:
             continue
         for statistic in REWEIGHTED_STATISTICS:
@@ -74,22 +75,26 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
             decisive = one[f"{name}_decisive_samples"].item()
             few = decisive < (LEAST_OF_MEAN if statistic == "mean" else LEAST_OF_SHARE)
             thin |= few
+            factor, unit = unit_of(analysis, name)
+            drawn, reweighted, low, high = factor * np.array([
+                one[name], one[f"{name}_reweighted"], *one[f"{name}_reweighted_interval"]
+            ])  # fmt: skip
             rows.append((
-                f"{name}{THIN * few}{bent}", unit_text(variable.units),
-                statistic.replace("_", " "),
-                number_text(one[name].item()), number_text(one[f"{name}_reweighted"].item()),
-                interval_text(*one[f"{name}_reweighted_interval"].values.tolist()),
+                f"{name}{THIN * few}{bent}", unit, statistic.replace("_", " "),
+                number_text(drawn), estimate_text(reweighted, low, high),
+                interval_text(low, high),
                 number_text(one[f"{name}_effective_samples"].item(), 3), number_text(decisive, 3),
             ))  # fmt: skip
     for event in analysis["event"].values:
         one = analysis.sel(event=event)
         decisive = one["reweighted_share_decisive"].item()
+        ends = one["reweighted_share_interval"].values.tolist()
         few = decisive < LEAST_OF_SHARE
         thin |= few
         shares.append((
             f"{event}{THIN * few}{'' if event == FAILED_RUNS else bent}",
-            number_text(one["reweighted_share"].item()),
-            interval_text(*one["reweighted_share_interval"].values.tolist()),
+            estimate_text(one["reweighted_share"].item(), *ends),
+            interval_text(*ends),
             number_text(decisive, 3),
         ))  # fmt: skip
     notes = list[str]()
@@ -121,10 +126,10 @@ def _verdicts(analysis: xr.Dataset) -> Table:
             f"{one['confidence_required'].item():g}",
             Verdict(one["reweighted_verdict"].item()).words,
             number_text(one["reweighted_probability"].item()),
-            interval_text(*one["reweighted_bounds"].values.tolist()),
+            _decisive(Verdict(one["reweighted_verdict"].item()), *one["reweighted_bounds"].values),
         ))  # fmt: skip
     head = ("requirement, reweighted", "probability", "confidence", "verdict", "estimate",
-            "one-sided bounds")  # fmt: skip
+            _SURELY)  # fmt: skip
     return marked(Table(head, rows), analysis, head.index("estimate"))
 
 
@@ -250,7 +255,7 @@ def not_met(analysis: xr.Dataset) -> list[str]:
 
 def verdict_table(analysis: xr.Dataset) -> Table:
     """The verdicts, a row a requirement; no rows without requirements."""
-    rows, notes = [], list[str]()
+    rows, notes = [], [_DECIDES] * ("requirement" in analysis.dims)
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         one = {str(n): v.item() for n, v in analysis.sel(requirement=name).items() if not v.dims}
         verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
@@ -258,7 +263,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         rows.append((
             one["requirement_text"], f"{one['probability_required']:g}",
             f"{one['confidence_required']:g}", verdict.words, number_text(one["probability"]),
-            interval_text(one["probability_lower"], one["probability_upper"]),
+            _decisive(verdict, one["probability_lower"], one["probability_upper"]),
             str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
             alone.words if one["samples_lost"] else "-", str(further) if further > 0 else "-",
         ))  # fmt: skip
@@ -289,10 +294,28 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             )
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
-        "verdict", "estimate", "one-sided bounds", "used", "violating", "failed runs",
+        "verdict", "estimate", _SURELY, "used", "violating", "failed runs",
         "verdict without failed runs", "further",
     )  # fmt: skip
     return marked(Table(head, rows, notes), analysis, head.index("estimate"))
+
+
+_SURELY = "surely"
+_DECIDES = (
+    "surely: the one-sided bound at that confidence that decides: met if it is at least the "
+    "probability, not met if it is at most less than that; where neither decides, both are told. "
+    "Two-sided intervals of 95 % decide nothing"
+)
+
+
+def _decisive(verdict: Verdict, low: float, high: float) -> str:
+    """The bound of a probability that decides a verdict; both where neither does."""
+    if verdict is Verdict.MET:
+        return f"at least {number_text(low)}"
+    if verdict is Verdict.NOT_MET:
+        return f"at most {number_text(high)}"
+    known = np.isfinite([low, high]).all()
+    return f"at least {number_text(low)}, at most {number_text(high)}" if known else "-"
 
 
 def outcome_table(analysis: xr.Dataset) -> Table:
@@ -302,7 +325,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
             str(kind),
             f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}"
             + f" ({one['outcome_lost'].item()} failed)" * bool(one["outcome_lost"].item()),
-            number_text(one["outcome_share"].item()),
+            estimate_text(one["outcome_share"].item(), *one["outcome_share_interval"].values),
             interval_text(*one["outcome_share_interval"].values),
             *map(number_text, one["outcome_share_convergence"].values[:-1]),
         )
@@ -324,29 +347,29 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     for name in outputs_in(analysis):
         if is_moment(name) and not every:
             continue
-        values, counts = analysis[name].values, analysis[f"{name}_samples"].values
+        factor, units = unit_of(analysis, name)
+        values, counts = factor * analysis[name].values, analysis[f"{name}_samples"].values
         mean, deviation, *quantiles, least, most = values
         used, run = counts[0], counts[:3].sum()  # what has not run is the last
         count = str(used) if used == run else f"{used} of {run}"
-        units = unit_text(analysis[name].attrs["units"])
-        within = float(analysis[f"{name}_same_within"])
+        within = factor * float(analysis[f"{name}_same_within"])
         if all_alike(least, most) or np.isfinite(within):
             middle = (least + most) / 2
-            value = "0" if abs(middle) < NOTHING else with_unit(number_text(middle), units or "1")
-            error = with_unit(f"{within:.2g}", units or "1")
+            value = "0" if abs(middle) < NOTHING else f"{number_text(middle)} {units}".rstrip()
+            error = f"{within:.2g} {units}".rstrip()
             error = f" (differs by less than its error bars, {error})"
             alike.append(
                 f"{name} {value}{error * (within > 0)}" + f" (in {count})" * int(used < run)
             )
         elif np.isfinite(least):
             fine = digits_of(least, most)
-            low, high = analysis[f"{name}_interval"].values[0].tolist()
+            low, high = (factor * analysis[f"{name}_interval"].values[0]).tolist()
             scatters = np.isfinite(analysis[f"{name}_error_of_mean"].values[0])
             few |= bool(scatters and np.isnan(low) and used < LEAST_OF_BOOTSTRAP)
             others = [number_text(v, fine) for v in (*quantiles, least, most)]
             worst = int(analysis[f"{name}_worst_sample"])
             rows.append((
-                name, units, number_text(mean, fine), interval_text(low, high, fine),
+                name, units, estimate_text(mean, low, high, fine), interval_text(low, high, fine),
                 number_text(deviation), *others, "-" if worst < 0 else str(worst), count,
             ))  # fmt: skip
     head = (
@@ -368,6 +391,14 @@ def too_few() -> str:
     )
 
 
+def unit_of(analysis: xr.Dataset, name: str) -> tuple[float, str]:
+    """Factor and unit in which tables tell an output; empty where it has none."""
+    factor, units = readable(
+        str(analysis[name].attrs["units"]), np.nanmax(np.abs(analysis[name].values), initial=0.0)
+    )
+    return factor, unit_text(units)
+
+
 def digits_of(least: float, most: float) -> int:
     """So many digits that a range has four of its own."""
     larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
@@ -379,7 +410,8 @@ def every_statistic(analysis: xr.Dataset) -> Table:
     rows = []
     for name in outputs_in(analysis):
         used, lost, absent, _ = (str(n) for n in analysis[f"{name}_samples"].values)
-        units, values = unit_text(analysis[name].attrs["units"]), analysis[name].values
+        factor, units = unit_of(analysis, name)
+        values = factor * analysis[name].values
         least, most = values[-2:]
         fine = digits_of(least, most)
         for k, statistic in enumerate(STATISTICS):
@@ -389,15 +421,16 @@ def every_statistic(analysis: xr.Dataset) -> Table:
             if np.isnan(value) or (same and statistic != "maximum"):
                 continue
             digits = 4 if statistic == "standard_deviation" else fine
-            first = analysis[f"{name}_convergence"].values[:-1, k]
-            low, high = analysis[f"{name}_interval"].values[k].tolist()
+            first = factor * analysis[f"{name}_convergence"].values[:-1, k]
+            low, high = (factor * analysis[f"{name}_interval"].values[k]).tolist()
             side, who = k - len(STATISTICS) + 2, ("-", "-")
             if side >= 0 and not same:
-                bar = analysis[f"{name}_end_error"].values[side]
+                bar = factor * analysis[f"{name}_end_error"].values[side]
                 who = str(analysis[f"{name}_end_sample"].values[side]), number_text(bar, 2)
             rows.append((
                 name, units,
-                "all" if same else statistic.replace("_", " "), number_text(value, digits),
+                "all" if same else statistic.replace("_", " "),
+                estimate_text(value, low, high, digits),
                 interval_text(low, high, digits), *who,
                 *(number_text(v, digits) for v in first), used, lost, absent,
             ))  # fmt: skip
@@ -431,13 +464,15 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         if same or not (known.any() and np.isfinite(mean)):
             continue
         every |= bool(known[1:].any())
+        factor, units = unit_of(analysis, name)
+        errors, largest = factor * errors, factor * largest
         cells = [number_text(errors[0], 2)]
         for error, count, most_of_all, sample in list(
             zip(errors, counts, largest, samples, strict=True)
         )[1:]:
             told = [number_text(error, 2), str(count), f"{most_of_all:.2g} (sample {sample})"]
             cells += told if count else ["-"] * 3
-        rows.append((name, analysis[name].attrs["units"], *cells, dominating(errors)))
+        rows.append((name, units, *cells, dominating(errors)))
     head = (
         "error of the mean of", "unit", "sampling (standard error)", "numerical (error bars)",
         "samples with bars", "largest bar", "engines (difference)", "samples checked",

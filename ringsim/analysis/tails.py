@@ -108,7 +108,7 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     found = design.levels(known)
     each = np.array([one.probability for one in found.repetitions])
     chains = np.array([one.variation for one in found.repetitions])
-    unled = _unled(found.repetitions, design.target)
+    unled = bound_of_first_levels(found.repetitions, design.target)
     ends, variation = replicated_interval(each, chains, unled)
     units = campaign[design.of].attrs.get("units", "1")
     event = _event(design, design.target, units)
@@ -148,7 +148,7 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _unled(found: list[Repetition], response: float) -> float:
+def bound_of_first_levels(found: list[Repetition], response: float) -> float:
     """Upper bound of the probability beyond a response from the independent samples of the first
     levels, whatever chains have found; 1 before they have run.
     """
@@ -175,7 +175,7 @@ def _short(
     if not ends or any(np.isnan(one.probability) for one in found):
         return {}
     each, chains = np.array([one.beyond(min(ends)) for one in found]).T
-    unled = _unled(found, min(ends))
+    unled = bound_of_first_levels(found, min(ends))
     ends_of_interval, _ = replicated_interval(each, chains, unled)
     if any(one.probability > 0.0 for one in found):  # by a way that the others did not find
         ends_of_interval[1] = unled

@@ -86,7 +86,7 @@ class ChainState:
         """What friction laws see."""
         return Pulleys(self.angles, np.abs(self.speeds), self.pulley_tensions)
 
-    @property
+    @cached_property
     def is_slack(self) -> Flags:
         """Whether a rope is longer than its path, or cut; shape (ropes,)."""
         longer = self.natural - self.paths > ROUNDED * self.natural

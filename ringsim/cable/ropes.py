@@ -1,5 +1,6 @@
 """Which spans form one rope."""
 
+import itertools
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -39,6 +40,18 @@ class Ropes:
     def cable_starts(self) -> Indices:
         """First span of each cable, with the number of all spans behind, shape (cables + 1,)."""
         return np.cumsum([0, *(points - 1 for points in self.points_per_cable)], dtype=np.intp)
+
+    @cached_property
+    def edges(self) -> list[int]:
+        """``cable_starts`` as a list."""
+        return [int(start) for start in self.cable_starts]
+
+    @cached_property
+    def pulley_edges(self) -> list[int]:
+        """First pulley of each cable, with the number of all pulleys behind."""
+        return list(
+            itertools.accumulate((points - 2 for points in self.points_per_cable), initial=0)
+        )
 
     @cached_property
     def spans(self) -> int:

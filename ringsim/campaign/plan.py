@@ -292,7 +292,7 @@ def status_lines(campaign: Folder) -> list[str]:
             rate = workers * ended[0] / max(spent[0], 1e-9)
             beside = " (without checks)" * bool(ended[1])
             lines.append(f"  rate           {rate:.3g} samples/s{beside}")
-        about = _left(campaign, left, spent / np.maximum(ended, 1), workers)
+        about = time_left(campaign, left, spent / np.maximum(ended, 1), workers)
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     return [*lines, f"  next           {_next(campaign, left, growth)}"]
 
@@ -308,7 +308,7 @@ def _next(campaign: Folder, left: int, growth: str) -> str:
     return f"ringsim {verb} {folder}"
 
 
-def _left(campaign: Folder, samples: int, each: NDArray[np.float64], workers: int) -> str:
+def time_left(campaign: Folder, samples: int, each: NDArray[np.float64], workers: int) -> str:
     """About how long samples, and checks by the other engine, take that are left; ``each`` are the
     seconds of one of either, 0 where none has ended.
     """

@@ -96,7 +96,7 @@ def run_ladder(
     results = study.run("settings", rungs)
     failed |= _failures(rungs, results)
     _require_references(rungs, failed, fidelity)
-    judged = judge(results, rungs, _quadrature(scene))
+    judged = judge(results, rungs, truths_of(scene))
     return judged.assign_attrs(remarks="\n".join(f"- {each}" for each in remarks))
 
 
@@ -172,7 +172,7 @@ def _needed(file: Path) -> xr.Dataset:
     return kept.assign({name: nothing for name in NEEDED if name not in kept})
 
 
-def _quadrature(scene: Scene) -> list[Truth]:
+def truths_of(scene: Scene) -> list[Truth]:
     """Deployment time of a ring that only position-dependent loads drive, without losses."""
     conservative = not scene.joints.present() and (scene.net is None or scene.net.lossless)
     if not scene.structure.locks or not scene.structure.closed:
@@ -221,7 +221,7 @@ def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
             "x_units": panel.x.units, "y_label": panel.y.label, "y_units": panel.y.units,
             "fidelity": panel.fidelity,
         }  # fmt: skip
-        parts = [_run(folder, piece, workers) for piece in _pieces(panel)]
+        parts = [_run(folder, piece, workers) for piece in pieces_of(panel)]
         found.append((words, xr.concat(parts, dim="cell")))
     return compared(joined(found))
 
@@ -238,7 +238,7 @@ def run_check(
     which = chosen_for_check(whole, share, seed)
     restarts, taken = whole["restarts"].values, (whole["final_time"] / whole["steps"]).values
     finer, numbers = [], itertools.count()
-    for piece in (piece for panel in panels for piece in _pieces(panel)):
+    for piece in (piece for panel in panels for piece in pieces_of(panel)):
         numbered = dict(zip(itertools.islice(numbers, len(piece.cells)), piece.cells, strict=True))
         if mine := [k for k in numbered if k in which]:
             own = [numbered[k] for k in mine]
@@ -251,7 +251,7 @@ def run_check(
     return checked(whole, which, xr.concat(finer, dim="cell")) if finer else whole
 
 
-def _pieces(panel: Panel) -> list[_Piece]:
+def pieces_of(panel: Panel) -> list[_Piece]:
     """The campaigns of a panel; an axis that shapes the result needs one for each value."""
     shaping = [sweep.shapes(panel.scene) for sweep in (panel.x, panel.y)]
     found: dict[str, _Piece] = {}

@@ -198,7 +198,9 @@ def replay_command(
         arrays = result.arrays()
         coordinates = {name: arrays.pop(name) for name in COORDINATES if name in arrays}
         outcome = Outcome(result.status, result.reason, coordinates, arrays, result.cause)
-        write(to_dataset(outcome, exact), save)
+        dataset = to_dataset(outcome, exact)
+        dataset.attrs["title"] += f", {name} of {campaign.attributes['campaign_name']}"
+        write(dataset, save)
         click.echo(f"wrote {save}")
     if before is None:
         click.echo("there is no stored result to compare with")

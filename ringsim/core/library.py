@@ -7,6 +7,7 @@ same order, of which an array is its address, its length and how many numbers ea
 
 import ctypes
 import hashlib
+import math
 import platform
 import struct
 from functools import cache
@@ -225,8 +226,7 @@ def _words(table: Any) -> list[int]:
     words: list[int] = []
     for letter, each in zip(_fields(table.__class__), table, strict=True):
         if letter in "an":
-            rest = int(np.prod(each.shape[1:], dtype=np.int64))
-            words += _address(each, letter), len(each), rest
+            words += _address(each, letter), len(each), math.prod(each.shape[1:])
         elif letter == "t":
             words += _words(each)
         elif letter == "r":

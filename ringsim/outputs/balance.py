@@ -20,6 +20,7 @@ from ringsim.outputs.family import (
 )
 from ringsim.scene import Scene
 from ringsim.stepping.instant import exchanged
+from ringsim.tables import known_to, readable
 from ringsim.variables import TIMINGS, Cause, Fate, Outcome, Status
 
 # Energies over time, and what their balance lacks.
@@ -120,9 +121,12 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
                 continue
             # Whole numbers of which some are missing come as floats out of files.
             number = int(number) if variable.dtype.startswith("i") else number
-            unit = {"degree": " deg", "1": ""}.get(variable.units, f" {variable.units}")
-            text = f"{number:{variable.summary[1]}}{unit}"
-            bar = np.asarray(values.get(f"{variable.name}_error", np.nan)).item()
+            factor, unit = readable(variable.units, number)
+            number = number if factor == 1.0 else factor * number
+            bar = factor * np.asarray(values.get(f"{variable.name}_error", np.nan)).item()
+            text = f"{number:{variable.summary[1]}}"
+            text = known_to(text, bar, exact=number).strip().rjust(len(text))
+            text += {"degree": " deg", "1": ""}.get(unit, f" {unit}")
             if np.isfinite(bar):  # samples of a campaign need not have one
                 text += f" +- {bar:.2g}"
             found[variable.name] = f"{text} {output().told(values, span_names)}".rstrip()

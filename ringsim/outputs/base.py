@@ -6,6 +6,7 @@ import numpy as np
 
 from ringsim.layout.layout import layout_of
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.parts.solver import LEAST_TOLERANCE
 from ringsim.stepping.locks import history
 
 # What the base carries, and how it turns.
@@ -110,13 +111,13 @@ def unresolved(run: Run) -> str:
     first = np.clip(np.searchsorted(times, locks) - 1, 0, len(times) - 2)
     last = np.maximum(np.searchsorted(times, locks + 0.25 * period), first + 1)
     longest = [float(np.diff(times[i : k + 1]).max()) for i, k in zip(first, last, strict=True)]
-    k = int(np.argmax(longest))
-    if longest[k] <= period / STEPS:
+    k, enough = int(np.argmax(longest)), period / STEPS
+    if longest[k] <= enough:
         return ""
     return (
         f"; steps of {1e3 * longest[k]:.3g} ms at the lock at {locks[k]:.6g} s are too long for "
         f"shocks in the rods (period {1e3 * period:.3g} ms), so peaks of base loads and corner "
-        f"accelerations may be too low: reduce {_cure(run)}"
+        f"accelerations may be too low: {_to(run, enough / longest[k])}"
     )
 
 
@@ -152,6 +153,18 @@ def jerked(run: Run) -> str:
         f"; whether the latch of {names}{more} catches is uncertain, as another joint locked in "
         f"the same step: reduce {_cure(run)}"
     )
+
+
+def _to(run: Run, factor: float) -> str:
+    """What makes steps so many times as long; a little less, since not all of them follow."""
+    solver = run.scene.solver
+    if solver.step_control == "constant":
+        return f"reduce solver.step to {_LESS * solver.step * factor:.2g} s"
+    tolerance = max(_LESS * solver.tolerance * factor**2, LEAST_TOLERANCE)
+    return f"reduce solver.tolerance to {tolerance:.1e}, as steps go with its square root"
+
+
+_LESS = 0.9
 
 
 def _cure(run: Run) -> str:

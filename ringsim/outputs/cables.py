@@ -1,7 +1,6 @@
 """The cables: tensions of spans, slack, pulleys' ratios, lengths."""
 
 import math
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -50,14 +49,8 @@ class CableTension(Output):
 
     def read(self, now: Reading) -> Array | None:
         """Shape (planes, spans), N; NaN where a plane has no cable or one of fewer spans."""
-        if now.chain is None:
-            return None
-        edges = now.chain.ropes.cable_starts.tolist()
-        found = np.full((len(now.angles), max(b - a for a, b in pairwise(edges))), np.nan)
-        for planes, (first, last) in zip(now.planes, pairwise(edges), strict=True):
-            for plane in planes:
-                found[plane, : last - first] = now.chain.tensions[first:last]
-        return found
+        chain = now.chain
+        return None if chain is None else now.by_place(chain.tensions, chain.ropes.edges)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated, and the largest reading or value at the last lock."""
@@ -171,13 +164,9 @@ class LongestSlack(Output):
             return None
         ropes = chain.ropes
         free = chain.lengths * ((chain.natural - chain.paths) / chain.paths)[ropes.of_span]
-        free = np.where(ropes.alive[ropes.of_span], free, -math.inf)
-        edges = ropes.cable_starts.tolist()
-        found = np.full((len(now.angles), max(b - a for a, b in pairwise(edges))), np.nan)
-        for planes, (first, last) in zip(now.planes, pairwise(edges), strict=True):
-            for plane in planes:
-                found[plane, : last - first] = free[first:last]
-        return found
+        if not ropes.alive.all():
+            free = np.where(ropes.alive[ropes.of_span], free, -math.inf)
+        return now.by_place(free, ropes.edges)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """The longest of all spans, and when it began; 0 s of no place if there was none."""
@@ -264,17 +253,14 @@ class PulleyRatio(Output):
         if chain is None:
             return None
         ropes = chain.ropes
-        before, behind = chain.tensions[ropes.behind - 1], chain.tensions[ropes.behind]
         taut = ~chain.is_slack[ropes.of_span[ropes.behind - 1]]
-        jammed = np.divide(behind, before, out=np.ones_like(before), where=taut)
-        law = np.exp(chain.exponents * chain.log_decays)
-        ratios = np.where(ropes.slips > 0.0, law, jammed)
-        edges = np.cumsum([0, *(points - 2 for points in ropes.points_per_cable)]).tolist()
-        found = np.full((2, len(now.angles), max(b - a for a, b in pairwise(edges))), np.nan)
-        for planes, (first, last) in zip(now.planes, pairwise(edges), strict=True):
-            for plane in planes:
-                found[:, plane, : last - first] = ratios[first:last], taut[first:last]
-        return found
+        ratios = np.exp(chain.exponents * chain.log_decays)
+        jammed = ropes.slips == 0.0
+        if jammed.any():
+            before, behind = chain.tensions[ropes.behind - 1], chain.tensions[ropes.behind]
+            met = np.divide(behind, before, out=np.ones_like(before), where=taut)
+            ratios = np.where(jammed, met, ratios)
+        return now.by_place(np.array([ratios, taut]), ropes.pulley_edges)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated; missing where the nearer step found the rope slack."""

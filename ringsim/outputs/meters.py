@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -189,6 +190,18 @@ class Reading(Instant):
         found = np.full(len(self.angles), np.nan)
         for planes, value in zip(self.planes, of_cables, strict=True):
             found[list(planes)] = value
+        return found
+
+    def by_place(self, of_cables: Array, edges: Sequence[int]) -> Array:
+        """Values for each plane, shape (..., planes, places), from those of all cables behind one
+        another, shape (..., places), which begin at the ``edges``; NaN where a plane has no cable
+        or one of fewer places.
+        """
+        most = max(b - a for a, b in pairwise(edges))
+        found = np.full((*of_cables.shape[:-1], len(self.angles), most), np.nan)
+        for planes, (first, last) in zip(self.planes, pairwise(edges), strict=True):
+            for plane in planes:
+                found[..., plane, : last - first] = of_cables[..., first:last]
         return found
 
     def stop_torques(self) -> Array | None:

@@ -19,6 +19,7 @@ from ringsim.outputs.family import (
     Reading,
     Run,
     Series,
+    Values,
     axes,
     holds,
     output_times,
@@ -30,6 +31,7 @@ from ringsim.scene import Scene
 from ringsim.stepping.control import RunControl
 from ringsim.stepping.instant import Energies, Memory, Remembering, pack, unpack
 from ringsim.stepping.locks import lock_times
+from ringsim.tables import with_unit
 from ringsim.variables import Fate, Outcome, Reason, Status
 
 # Recording a run step by step, and reducing it to its outcome at the end.
@@ -183,10 +185,27 @@ def overloads(
         if largest.max() > most:
             unit, time = output.variables[0].units, series.times[largest.argmax()]
             found += (
-                f"; {largest.max():.4g} {unit} at {time:.6g} s, "
-                f"more than limits.{output.limit} = {most:g} {unit}"
+                f"; {with_unit(f'{largest.max():.4g}', unit)} at {time:.6g} s, "
+                f"more than limits.{output.limit} = {with_unit(f'{most:g}', unit)}"
             )
     return found
+
+
+def below_limits(scene: Scene, values: Values) -> Iterator[str]:
+    """How far each load stayed below the limit of the scene, in a sentence; nothing of others."""
+    for output in OUTPUTS:
+        most = getattr(scene.limits, output.limit) if output.limit else None
+        series, *others = output.variables
+        if most is None or series.name not in values:
+            continue
+        (peak,) = (one for one in others if one.largest_of == series.name)
+        # A peak may count up to the last lock, a limit holds for the whole run.
+        largest = max(float(values[peak.name]), float(np.nanmax(values[series.name])))
+        if largest <= most and peak.summary is not None:
+            yield (
+                f"{peak.summary[0]} stays {100.0 * (1.0 - largest / most):.0f} % below "
+                f"limits.{output.limit} = {with_unit(f'{most:g}', peak.units)}"
+            )
 
 
 def ended(

@@ -36,7 +36,7 @@ class RodStress(Output):
         Variable(
             "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod",
             error_bar=ErrorBar("largest stress", safety=4.0),
-            summary=("largest rod stress", "10.3e"), worse="larger", largest_of="rod_stress",
+            summary=("largest rod stress", "10.4g"), worse="larger", largest_of="rod_stress",
         ),
         *PEAK.variables,
     )  # fmt: skip

@@ -18,7 +18,7 @@ TENSION_BEND = 15.0
 """Bend of a tension from step to step that is allowed, over its largest value and ``tolerance``.
 At 3e-3, the tolerance of ``ring18-cable``, that is 0.045, and the peaks found are good to 2.5 %
 (rings of 4 and 5 sections that lock slowly) or better, for at most a third more steps."""
-_LEAST_STEP, _LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-9, 1e-8, 0.1
+_LEAST_STEP, LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-9, 1e-8, 0.1
 _LEAST_DEVIATION = 1e-6
 MOST_STEPS = 10_000_000
 """Upper bound of ``step_limit``."""
@@ -40,7 +40,7 @@ class Solver(Model):
     """Largest step, or the step if it is constant."""
     step_control: Literal["motion", "constant"] = "motion"
     """Whether steps follow the motion, or all are equal."""
-    tolerance: Annotated[float, Field(ge=_LEAST_TOLERANCE, le=_LARGEST_TOLERANCE)] = 3e-4
+    tolerance: Annotated[float, Field(ge=LEAST_TOLERANCE, le=_LARGEST_TOLERANCE)] = 3e-4
     """Relative error in time per step that the step control aims at; errors of a run grow like
     it."""
     spectral_radius: Ratio = 0.8
@@ -91,7 +91,7 @@ class Solver(Model):
         return self.model_copy(
             update={
                 "step": min(max(step, _LEAST_STEP), self.end_time),
-                "tolerance": min(max(tolerance, _LEAST_TOLERANCE), _LARGEST_TOLERANCE),
+                "tolerance": min(max(tolerance, LEAST_TOLERANCE), _LARGEST_TOLERANCE),
                 "deviation_tolerance": deviations,
             }
         )

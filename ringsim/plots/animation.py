@@ -73,7 +73,7 @@ def animate(run: xr.Dataset, path: Path, colour: str = "lag") -> Path:
         shape = shape_of(run, scene_from_toml(str(run.attrs["scene"]), source="attribute scene"))
     except ValueError as error:
         raise InputError(f"{path}: {error}: there is nothing to draw") from error
-    paint = _stresses(run, shape) if colour == "stress" else _lags(run, shape)
+    paint = by_stress(run, shape) if colour == "stress" else by_lag(run, shape)
     frames = _frames(run, shape, paint)
     lasts = [1000 // RATE] * (len(frames) - 1) + [int(1000 * HELD)]
     with writing(path), whole(path, lasting=False) as draft:
@@ -176,7 +176,8 @@ def _course(figure: Figure, run: xr.Dataset, paint: _Paint) -> Any:
     return axes.axvline(0.0, color=style.VERMILLION, linewidth=1.6)
 
 
-def _lags(run: xr.Dataset, shape: Shape) -> _Paint:
+def by_lag(run: xr.Dataset, shape: Shape) -> _Paint:
+    """Colours of sections by how far each V-joint is from the mean angle, InputError without."""
     if "opening_angle" not in run:
         raise InputError("--colour lag: the run holds no opening angles to draw it by")
     angle = run["opening_angle"]
@@ -195,7 +196,8 @@ def _lags(run: xr.Dataset, shape: Shape) -> _Paint:
     )  # fmt: skip
 
 
-def _stresses(run: xr.Dataset, shape: Shape) -> _Paint:
+def by_stress(run: xr.Dataset, shape: Shape) -> _Paint:
+    """Colours of rods by their stress, InputError without."""
     if "rod_stress" not in run or not bool(np.isfinite(run["rod_stress"]).any()):
         raise InputError(
             "--colour stress: the run recorded no stress: run it with --set record.stress=true, or "

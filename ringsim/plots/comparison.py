@@ -1,5 +1,6 @@
 """Figures of two campaigns, or two runs, beside each other."""
 
+import textwrap
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,16 +10,19 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from ringsim.analysis.comparison import paired
 from ringsim.analysis.comparison_text import differing, names_of
+from ringsim.analysis.courses import deployed, names_of_ends
 from ringsim.analysis.design import blocks, endings, population_of, scalars, values_of
-from ringsim.analysis.intervals import good, numbers, tells_of
+from ringsim.analysis.intervals import good, numbers, tells_of, used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import legend, limits
-from ringsim.tables import interval_text, number_text, with_unit
+from ringsim.tables import estimate_text, interval_text, readable, unit_text, with_unit
 
 _LOOKS = ((style.BLUE, "-"), (style.ORANGE, (0, (5, 1.5))))
 """Colour and dashes of either: dashes tell them apart in grey."""
 _BANDS = (0.05, 0.5, 0.95)
+_WIDE = 44
+"""Letters of a title above a panel."""
 _RECORDS = 301
 """Times of a course at most: more than a figure resolves, and all samples are read at each."""
 _COURSES = {
@@ -36,6 +40,14 @@ def figures_of_both(
     found: xr.Dataset, first: xr.Dataset, second: xr.Dataset
 ) -> Iterator[tuple[str, str, Figure]]:
     """Name, what it shows in words, and figure, of what ``compare`` has found of two datasets."""
+    for name, words, figure in _figures(found, first, second):
+        style.in_readable_units(figure)
+        yield name, words, figure
+
+
+def _figures(
+    found: xr.Dataset, first: xr.Dataset, second: xr.Dataset
+) -> Iterator[tuple[str, str, Figure]]:
     both = population_of(first), population_of(second)
     if "sample" in first.dims:
         known = [set(scalars(each)) for each in both]
@@ -46,7 +58,8 @@ def figures_of_both(
         if names:
             yield "values", "Distribution of each main number in both", values(found, both, names)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
-    drawn = {name: [_course(each, name) for each in both] for name in names}
+    until = max(_last(each) for each in both)
+    drawn = {name: [_course(each, name, until) for each in both] for name in names}
     read = {n: rows for n, rows in drawn.items() if all(np.isfinite(r).any() for _, r in rows)}
     if read:
         yield "courses", "Courses over time in both", courses(found, both, read)
@@ -83,10 +96,13 @@ def pairs(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
                 axes.plot(one[own], apart[own], marker, color=colour, markersize=4.5, alpha=0.8,
                           linestyle="none", label=word, rasterized=own.sum() > 500)  # fmt: skip
         units = str(both[0][name].attrs.get("units", "1"))
-        axes.set_title(
-            f"mean {with_unit(number_text(found[f'{name}_difference'].item(), 3), units)}"
+        mean = found[f"{name}_difference"].item()
+        factor, units = readable(units, np.nanmax(np.abs(one)))
+        mean, low, high = factor * mean, factor * low, factor * high
+        axes.set_title(textwrap.fill(
+            f"mean {estimate_text(mean, low, high, 3)} {unit_text(units)}".rstrip()
             + (f" ({interval_text(low, high, 3)})" if np.isfinite(low + high) else "")
-            + f", n = {int(known.sum())}", fontsize=9,
+            + f", n = {int(known.sum())}", _WIDE), fontsize=9,
         )  # fmt: skip
         axes.set_xlabel(f"{style.label(both[0][name], width=38)}, {first}", fontsize=9)
         axes.xaxis.set_major_locator(MaxNLocator(5))
@@ -113,9 +129,10 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
         wanted = dict.fromkeys(limit for each in both for limit in limits(each, name))
         for word, limit in wanted:
             axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (1, 1.5)), linewidth=1.3)
-            axes.annotate(f"{word} {limit:g}", (limit, 1.0), xytext=(0, 2), ha="center",
+            units = str(both[0][name].attrs.get("units", "1"))
+            axes.annotate(f"{word} {with_unit(f'{limit:g}', units)}", (limit, 1.0), ha="center",
                           color=style.VERMILLION, xycoords=axes.get_xaxis_transform(),
-                          textcoords="offset points", fontsize=9)  # fmt: skip
+                          textcoords="offset points", xytext=(0, 2), fontsize=9)  # fmt: skip
         axes.set_title(f"n = {', '.join(counts)}", fontsize=9, pad=16.0 if wanted else None)
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -132,7 +149,8 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
 @style.styled
 def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Array]]]) -> Figure:
     """A panel a quantity over time: of runs their course, of campaigns the median with a band from
-    5 to 95 % of the samples that still run; ``read`` has times and rows of both by quantity.
+    5 to 95 % of all samples, also of those that are over; ``read`` has times and rows of both by
+    quantity.
     """
     single = "sample" not in both[0].dims
     figure = Figure(figsize=(8.2, 2.3 * len(read) + 1.2))
@@ -153,14 +171,21 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         if name != "opening_angle":
             style.span_sizes(axes, np.concatenate([each.ravel() for each in drawn]))
     grid[-1].set_xlabel(style.label(both[0]["time"]))
-    grid[0].set_xlim(0.0, max(float(_last(each)) for each in both))
+    grid[0].set_xlim(0.0, max(_last(each) for each in both))
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
     if not single:
-        words = "Lines are medians, bands 5 to 95 % of the samples that still run."
-        figure.legends[0].set_title(words)
+        figure.legends[0].set_title(_OF_ALL)
         figure.legends[0].get_title().set_fontsize(9)
     return figure
+
+
+_OF_ALL = (
+    "Lines are medians, bands 5 to 95 % of all samples. What is over counts on: a deployed ring\n"
+    "with 180 deg and in step, everything else with its last value."
+)
+_DEPLOYED = {"opening_angle": 180.0, "asynchrony": 0.0}
+"""What a deployed ring has: its last record may be before its last lock."""
 
 
 def _last(dataset: xr.Dataset) -> float:
@@ -170,22 +195,37 @@ def _last(dataset: xr.Dataset) -> float:
     return float(np.nanmax(np.append(dataset["final_time"].to_numpy(), 0.0)))
 
 
-def _course(dataset: xr.Dataset, name: str) -> tuple[Array, Array]:
-    """Times and rows of a quantity, (quantile, time): of a run itself, of a campaign ``_BANDS``."""
+def _course(dataset: xr.Dataset, name: str, until: float) -> tuple[Array, Array]:
+    """Times and rows of a quantity up to a time (s), (quantile, time): of a run itself, of a
+    campaign ``_BANDS``.
+    """
     time = dataset["time"].to_numpy()
-    last = int(np.clip(np.searchsorted(time, _last(dataset)), 1, len(time) - 1))
+    last = int(np.clip(np.searchsorted(time, until), 1, len(time) - 1))
     at = np.unique(np.linspace(0, last, min(last + 1, _RECORDS)).round().astype(int))
     if "sample" not in dataset.dims:
         return time[at], _over_places(dataset[name], name).isel(time=at).to_numpy()[None]
+    about = [each for each in ("status", "deployment_time") if each in dataset]
     parts = [
-        _over_places(block[name], name).transpose("sample", "time").to_numpy()[good(block)][:, at]
-        for block in blocks(dataset, [name, "status"])
+        _held(used(block), name)[:, at]
+        for block in blocks(dataset, [name, *about, *names_of_ends(dataset)])
     ]
     held = np.concatenate(parts)
     rows = np.full((len(_BANDS), len(at)), np.nan)
     known = np.isfinite(held).any(axis=0)
     rows[:, known] = np.nanquantile(held[:, known], _BANDS, axis=0)
     return time[at], rows
+
+
+def _held(block: xr.Dataset, name: str) -> Array:
+    """A quantity of samples that stays what it was when they were over, (sample, time)."""
+    rows: Array = _over_places(block[name], name).transpose("sample", "time").to_numpy()
+    known = np.where(np.isfinite(rows), np.arange(rows.shape[1]), -1)
+    last = np.maximum.accumulate(known, axis=1)
+    rows = np.where(last < 0, np.nan, np.take_along_axis(rows, last.clip(0), axis=1))
+    if name in _DEPLOYED and "deployment_time" in block:
+        over = np.arange(rows.shape[1]) > known.max(axis=1, keepdims=True)
+        rows[over & deployed(block)[:, None]] = _DEPLOYED[name]
+    return rows
 
 
 def _over_places(values: xr.DataArray, name: str) -> xr.DataArray:

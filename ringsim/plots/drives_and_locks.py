@@ -1,4 +1,4 @@
-"""Figures of a run's drive, motors and locks."""
+"""Figures of a run's drive, motors, base and locks."""
 
 from typing import Any
 
@@ -8,6 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from ringsim.layout.bodies import OnBody
+from ringsim.layout.layout import layout_of
+from ringsim.layout.points import points_of
 from ringsim.plots import style
 from ringsim.plots.registry import picture
 from ringsim.scene import scene_from_toml
@@ -15,6 +18,7 @@ from ringsim.scene import scene_from_toml
 _SOURCES = (
     style.SKY, style.ORANGE, style.GREEN, style.VERMILLION, style.PURPLE, style.BLUE, style.GREY,
 )  # fmt: skip
+_HATCHES = ("", "//", "..", "\\\\", "xx", "--", "oo")
 
 
 @picture("run", 110, "Drive and resistance", ("drive_margin", "opening_angle"))
@@ -38,6 +42,8 @@ def drive(dataset: xr.Dataset) -> Figure:
         upper.stackplot(
             angle, *(each.values for each in heights), labels=kinds,
             colors=[_SOURCES[k % len(_SOURCES)] for k in range(len(kinds))], alpha=0.7,
+            hatch=[_HATCHES[k % len(_HATCHES)] for k in range(len(kinds))], edgecolor=style.INK,
+            linewidth=0.3,
         )  # fmt: skip
     upper.plot(
         angle, known["drive_available"], color=style.INK, label="drive without pulleys' loss"
@@ -96,9 +102,53 @@ def motors(dataset: xr.Dataset) -> Figure:
     return figure
 
 
+def _moves(dataset: xr.Dataset) -> bool:
+    return style.largest_magnitude(dataset["base_rotation"]) > _STILL
+
+
+_STILL = 1e-6
+"""Turn of a base that is none, degree."""
+
+
+@picture("run", 118, "Attitude and place of the spacecraft", ("base_rotation",), _moves)
+def base(dataset: xr.Dataset) -> Figure:
+    """``base_rotation`` (axis, time) and, where positions are recorded, how far the boom's upper
+    end has moved since the start; a line an axis.
+    """
+    scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
+    shown = [dataset["base_rotation"].assign_attrs(long_name="rotation vector since the start")]
+    if "position" in dataset:
+        layout = layout_of(scene)
+        points = points_of(layout, scene.structure.planes)
+        name = next(
+            name for name, at in zip(points.names, points.mounts, strict=True)
+            if isinstance(at, OnBody) and at.body == layout.base and not at.arm.any()
+        )  # fmt: skip
+        place = dataset["position"].sel(point=name)
+        words = "way of the boom's upper end since the start"
+        shown.append((place - place.isel(time=0)).assign_attrs(units="m", long_name=words))
+    figure = Figure(figsize=(8.4, 2.5 * len(shown) + 1.3))
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, values in zip(panels, shown, strict=True):
+        looks = zip(values["axis"].values, _LINES, _DASHES, strict=False)
+        for axis, colour, dashes in looks:
+            axes.plot(values["time"], values.sel(axis=axis), color=colour, linestyle=dashes,
+                      label=f"{axis} axis")  # fmt: skip
+        axes.set_ylabel(style.label(values, width=30), fontsize=9)
+        axes.margins(y=0.12)
+    figure.align_ylabels(panels)
+    style.time_axes(dataset, dataset["base_rotation"], *panels)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    body = "spacecraft" if scene.spacecraft is not None else "free base"
+    style.head(figure, panels[0], dataset, f"Attitude and place of the {body}")
+    return figure
+
+
 _LINES = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE)
 _LOCKS = ("lock_time", "latch_rate", "lock_impulse")
 _LEAST: dict[str, Any] = {"color": style.VERMILLION, "linewidth": 1.2, "linestyle": (0, (5, 2))}
+_BESIDE = 0.12
+"""Half the distance of the marks of two planes, which mostly lock alike, in sections."""
 _MARKS = (("o", style.BLUE), ("D", style.ORANGE), ("s", style.GREEN))
 
 
@@ -112,10 +162,12 @@ def locks(dataset: xr.Dataset) -> Figure:
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     sections, planes = dataset["section"].values, dataset["plane"].values.tolist()
     for axes, name in zip(panels, names, strict=True):
-        for plane, (marker, colour) in zip(planes, _MARKS, strict=False):
+        for number, (plane, (marker, colour)) in enumerate(zip(planes, _MARKS, strict=False)):
             values = dataset[name].sel(plane=plane).values
-            axes.plot(sections, values, marker, color=colour, markersize=5, alpha=0.85)
-        axes.set_ylabel(style.label(dataset[name].assign_attrs(long_name=_SAID[name])), fontsize=9)
+            beside = _BESIDE * (2.0 * number - len(planes) + 1.0)
+            axes.plot(sections + beside, values, marker, color=colour, markersize=5, alpha=0.85)
+        about = dataset[name].assign_attrs(long_name=_SAID[name])
+        axes.set_ylabel(style.label(about, width=20), fontsize=9)
         axes.margins(y=0.15)
         if name != "lock_time":
             axes.set_ylim(bottom=0.0)

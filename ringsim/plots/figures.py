@@ -35,7 +35,9 @@ def figures_of(dataset: xr.Dataset, name: str | None = None) -> Iterator[tuple[P
         if each.read is not None and each.read not in read:
             read[each.read] = each.read(dataset)
         shared = [] if each.read is None else [read[each.read]]
-        yield each, each.draw(dataset, *shared)
+        figure = each.draw(dataset, *shared)
+        style.in_readable_units(figure)
+        yield each, figure
 
 
 def _recorded(dataset: xr.Dataset, each: Picture) -> bool:

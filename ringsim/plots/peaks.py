@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 
 from ringsim.outputs.family import Array
 from ringsim.plots import style
+from ringsim.tables import known_to
 
 
 class Peak(NamedTuple):
@@ -21,6 +22,8 @@ class Peak(NamedTuple):
     value: float
     time: float
     place: dict[str, Any]
+    error: float = math.nan
+    """Its numerical error bar."""
 
     def within(self, values: xr.DataArray, factor: float = 1.0) -> tuple[Array, Array]:
         """Times and values of a recorded curve (time,), with the peak as one of its points.
@@ -60,6 +63,7 @@ def peak_of(
     return Peak(
         stated if math.isfinite(stated) else float(best),
         time if math.isfinite(time) else float(best["time"]), place,
+        float(dataset.get(f"{value}_error", math.nan)),
     )  # fmt: skip
 
 
@@ -74,11 +78,12 @@ def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) ->
     if not math.isfinite(peak.value):
         return
     height = factor * peak.value
+    told = known_to(f"{height:.3g}", factor * peak.error, exact=height)
     axes.plot(peak.time, height, "o", color=style.VERMILLION, markersize=6, zorder=4, clip_on=False)
     early = peak.time < 0.5 * sum(axes.get_xlim())
     style.free(axes.text(
         0.98 if early else 0.02, 0.95 if early else 0.82,
-        f"largest: {height:.3g} {units} at {peak.time:.4g} s\n{place}", transform=axes.transAxes,
+        f"largest: {told} {units} at {peak.time:.4g} s\n{place}", transform=axes.transAxes,
         va="top", ha="right" if early else "left", color=style.VERMILLION, bbox=style.PAPER,
         zorder=5,
     ))  # fmt: skip

@@ -21,15 +21,24 @@ from ringsim.plots.peaks import mark, peak_of
 from ringsim.plots.registry import barred, jointed, picture
 from ringsim.scene import Scene, scene_from_toml
 
-_COLOURS = (style.INK, "#d00000", style.BLUE, style.GREEN, style.ORANGE, style.PURPLE)
-_HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
+_LOOKS: tuple[tuple[str, Any], ...] = (
+    (style.INK, "-"), ("#d00000", (0, (5, 1.5))), (style.BLUE, (0, (1.2, 1.2))),
+    (style.GREEN, (0, (6, 1.5, 1, 1.5))), (style.ORANGE, (0, (2.5, 1.5))),
+    (style.PURPLE, (0, (6, 1.5, 1, 1.5, 1, 1.5))),
+)  # fmt: skip
+"""Colour and dashes of a section; dashes tell them apart in grey."""
+_HALVES = {"left": 1.8, "right": 0.8}
+"""Width of the line of a half."""
+_LARGEST: dict[str, Any] = {
+    "color": style.VERMILLION, "linewidth": 1.0, "linestyle": (0, (8, 1.5, 1, 1.5)),
+}  # fmt: skip
 
 
 @picture("run", 40, "Stress in the rods over time", ("rod_stress",), jointed)
 def rod_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Figure:
     """``rod_stress`` (rod, section, time), one axes a rod; its halves as in paper 002, figs 11-13.
 
-    Bands reach from the least to the largest of all sections, full lines are left halves, dashed
+    Bands reach from the least to the largest of all sections, wide lines are left halves, narrow
     ones right halves.  The half with ``peak_rod_stress`` is drawn whatever its section.
     ``sections`` are at most six section numbers, by default :func:`default_sections`.
 
@@ -40,9 +49,9 @@ def rod_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Fi
     """
     chosen = default_sections(dataset.sizes["section"]) if sections is None else tuple(sections)
     missing = set(chosen) - set(dataset["section"].values.tolist())
-    if missing or not 0 < len(chosen) <= len(_COLOURS):
+    if missing or not 0 < len(chosen) <= len(_LOOKS):
         raise ValueError(
-            f"sections = {list(chosen)} must be one to {len(_COLOURS)} of the sections "
+            f"sections = {list(chosen)} must be one to {len(_LOOKS)} of the sections "
             f"1..{dataset.sizes['section']}"
         )
     stress = dataset["rod_stress"]
@@ -51,35 +60,40 @@ def rod_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Fi
     rods = list(dict.fromkeys(rod.rpartition("_")[0] for rod in stress["rod"].values.tolist()))
     figure = Figure(figsize=(11.0, 2.7 * -(-len(rods) // 2) + 1.1))
     grid = figure.subplots(-(-len(rods) // 2), 2, sharex=True, sharey=True)
-    coloured = list(zip(chosen, _COLOURS, strict=False))
+    looks = list(zip(chosen, _LOOKS, strict=False))
     style.time_axes(dataset, stress.max("section"), *grid[:, 0])
     style.time_axes(dataset, stress.max("section"), *grid[:, 1], named=False)
-    style.span_sizes(grid[0, 0], factor * np.append(stress.values, peak.value))
+    limit = style.limit_of(dataset, "rod_stress")
+    style.span_sizes(grid[0, 0], factor * np.append(stress.values, [peak.value, limit]))
     for axes, rod in zip(grid.flat, rods, strict=False):
         halves = factor * stress.sel(rod=stress["rod"].str.startswith(f"{rod}_"))
         least, most = (reduced(("rod", "section")) for reduced in (halves.min, halves.max))
         axes.fill_between(halves["time"], least, most, color=style.PALE, linewidth=0.0)
-        for section, colour in coloured:
-            for half, dashes in _HALVES.items():
+        for section, (colour, dashes) in looks:
+            for half, width in _HALVES.items():
                 values = halves.sel(rod=f"{rod}_{half}", section=section)
-                axes.plot(values["time"], values, color=colour, linestyle=dashes, linewidth=1.2)
+                axes.plot(values["time"], values, color=colour, linestyle=dashes, linewidth=width)
         name = " ".join(reversed(rod.split("_")))
         style.name_panel(axes, name)
+        style.draw_limit(axes, factor * limit, f"limits.rod_stress = {factor * limit:g} {units}")
         if peak.place["rod"].startswith(f"{rod}_"):
             worst = peak.within(stress.sel(peak.place), factor)
-            axes.plot(*worst, color=style.VERMILLION, linewidth=1.0, zorder=3)
+            axes.plot(*worst, zorder=3, **_LARGEST)
             half = peak.place["rod"].rpartition("_")[-1]
             place = f"section {peak.place['section']}, {name}, {half} half"
             mark(axes, peak, units, place, factor)
     figure.supylabel(style.label(stress, units), fontsize=10.5)
-    entries = [Line2D([], [], color=colour, label=f"section {n}") for n, colour in coloured]
+    entries = [
+        Line2D([], [], color=colour, linestyle=dashes, label=f"section {n}")
+        for n, (colour, dashes) in looks
+    ]
     entries += [
-        Line2D([], [], color=style.GREY, linestyle=dashes, linewidth=1.2, label=f"{half} half")
-        for half, dashes in _HALVES.items()
+        Line2D([], [], color=style.GREY, linewidth=width, label=f"{half} half")
+        for half, width in _HALVES.items()
     ]
     entries += [
         Line2D([], [], color=style.PALE, linewidth=7.0, label="all sections"),
-        Line2D([], [], color=style.VERMILLION, linewidth=1.0, label="half with the largest"),
+        Line2D([], [], label="half with the largest", **_LARGEST),
     ]
     figure.legend(handles=entries, loc="outside lower center", ncols=len(entries))
     style.head(figure, grid[0, 0], dataset, "Rod stress")
@@ -290,6 +304,7 @@ def cables(dataset: xr.Dataset) -> Figure:
     until = style.locked_time(dataset)
     until = until if math.isfinite(until) else math.inf
     peak = peak_of(dataset, "cable_tension", "peak_tension", until)
+    limit = style.limit_of(dataset, "tension")
     figure, grid = _by_plane(dataset, planes, len(names), (2.1, 0.8))
     for column, plane in zip(grid.T, planes, strict=True):
         for axes, name in zip(column, names, strict=True):
@@ -298,12 +313,13 @@ def cables(dataset: xr.Dataset) -> Figure:
     for row, name in zip(grid, names, strict=True):
         drawn = np.concatenate([series[plane][name].values for plane in planes])
         if name == "tension":
-            drawn = np.append(tension.values, peak.value)
+            drawn = np.append(tension.values, [peak.value, limit])
         row[0].set_ylabel(style.label(series[planes[0]][name], width=26))
         if name not in ("neutral_length", "decay"):
             style.span_sizes(row[0], np.where(drawn > 1e-6, drawn, np.nan))
     for axes, plane in zip(grid[names.index("tension")], planes, strict=True):
         spans = tension.sel(plane=plane)
+        style.draw_limit(axes, limit, f"limits.tension = {limit:g} N")
         least, most = spans.min("span"), spans.max("span")
         axes.fill_between(dataset["time"], least, most, color=style.PALE, linewidth=0.0)
         if plane == peak.place["plane"]:

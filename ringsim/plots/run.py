@@ -28,8 +28,8 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
     Each plane has a column, and colour counts the sections; ``lock_time`` and ``deployment_time``
     are marked where they are known.
     """
-    angle = dataset["opening_angle"].dropna("time", how="all")
-    deviation = deviations(dataset)
+    angle = _to_the_end(dataset, dataset["opening_angle"].dropna("time", how="all"), 180.0)
+    deviation = _to_the_end(dataset, deviations(dataset), 0.0)
     planes, sections = dataset["plane"].values.tolist(), dataset["section"]
     figure = Figure(figsize=(5.2 * len(planes) + 0.6, 6.4))
     grid = figure.subplots(
@@ -52,6 +52,14 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
         bar.outline.set_visible(False)
     style.head(figure, grid[0, 0], dataset, "Opening angles")
     return figure
+
+
+def _to_the_end(dataset: xr.Dataset, values: xr.DataArray, last: float) -> xr.DataArray:
+    """A course with what a ring has that has deployed behind the last record."""
+    deployed, final = style.locked_time(dataset), float(dataset.get("final_time", math.nan))
+    times = [t for t in (deployed, max(deployed, final)) if t > float(values["time"][-1])]
+    more = [xr.full_like(values[..., -1:], last).assign_coords(time=[t]) for t in times]
+    return xr.concat([values, *more], "time") if more else values
 
 
 def deviations(dataset: xr.Dataset) -> xr.DataArray:
@@ -115,6 +123,7 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     values = dataset["asynchrony"].dropna("time")
     moving = values[~(values["time"].values > style.deployment_time(dataset))]
     end = float(moving["time"][-1])
+    moving = _to_the_end(dataset, moving, 0.0)
     peak = peak_of(dataset, "asynchrony", "asynchrony_max", end)
     times, heights = peak.within(moving)
     figure = Figure(figsize=(10.2, 4.3))
@@ -210,6 +219,7 @@ def imbalance(dataset: xr.Dataset) -> xr.DataArray:
 
 _TRIANGLE: dict[str, Any] = {
     "color": style.VERMILLION, "markersize": 9, "markeredgecolor": "white", "clip_on": False,
+    "zorder": 4,
 }  # fmt: skip
 _DOT: dict[str, Any] = {"color": style.INK, "markersize": 4, "clip_on": False}
 

@@ -7,7 +7,7 @@ import math
 import re
 import textwrap
 from collections.abc import Iterator
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from matplotlib.transforms import Bbox
 from PIL import Image
 
-from ringsim.tables import counted, unit_behind
+from ringsim.scene import scene_from_toml
+from ringsim.tables import counted, known_to, readable, unit_behind
 from ringsim.variables import Fate, Status
 
 # Words inside axes, put where they cover no curve.
@@ -121,8 +122,10 @@ def new_panels(
 
 
 def title(figure: Figure, text: str) -> None:
-    """A bold title in the upper left corner of the sheet."""
-    figure.suptitle(plain(text), x=0.012, ha="left")
+    """A bold title in the upper left corner of the sheet, in lines that fit it."""
+    width = int(10.3 * figure.get_size_inches()[0])
+    lines = (textwrap.fill(line, width) for line in text.split("\n"))
+    figure.suptitle(plain("\n".join(lines)), x=0.012, ha="left")
 
 
 def plain(text: str) -> str:
@@ -168,6 +171,27 @@ def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
     return 1000.0**-power, _PREFIXES[power] + units
 
 
+def in_readable_units(figure: Figure) -> None:
+    """Let the axes and words of a figure of SI values give stress as people read it."""
+    for axes, side in product(figure.axes, ("x", "y")):
+        axis: Axis = getattr(axes, f"{side}axis")
+        beside = getattr(figure, f"get_sup{side}label")()
+        if _PASCAL in axis.get_label_text() or _PASCAL in beside:
+            factor, units = readable("Pa", max(map(abs, axis.get_view_interval())))
+            axis.set_major_formatter(FuncFormatter(partial(_scaled, factor)))
+            axis.set_minor_formatter(NullFormatter())
+            axis.set_label_text(axis.get_label_text().replace(_PASCAL, f"({units})"))
+    for text in figure.findobj(Text):
+        text.set_text(text.get_text().replace(_PASCAL, "(MPa)"))
+
+
+_PASCAL = "(Pa)"
+
+
+def _scaled(factor: float, value: float, _: int) -> str:
+    return f"{factor * value:g}"
+
+
 def largest_magnitude(variable: xr.DataArray) -> float:
     """Largest finite absolute value, 0 if there is none."""
     values = variable.values
@@ -196,12 +220,18 @@ def ending(dataset: xr.Dataset) -> str:
     status, fate = Status(int(dataset["status"])), Fate(int(dataset.get("outcome", Fate.NONE)))
     word = (status if status.failed else fate).words
     if fate == Fate.DEPLOYED and math.isfinite(deployed := deployment_time(dataset)):
-        return f"Deployed after {deployed:.2f} s"
+        return f"Deployed after {_moment(dataset, deployed)}"
     final = float(dataset.get("final_time", math.nan))
     reason = str(dataset.attrs.get("reason", "")).strip()
     start = "Ended" if word == "none" else word.capitalize()
     start += f" after {final:.4g} s" if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
+
+
+def _moment(dataset: xr.Dataset, deployed: float) -> str:
+    """The deployment time as far as its error bar, if there is one, lets it be known."""
+    error = float(dataset.get("deployment_time_error", math.nan))
+    return f"{known_to(f'{deployed:.2f}', error, exact=deployed)} s"
 
 
 def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: float = 8.0) -> None:
@@ -297,7 +327,7 @@ def time_axes(
     if named:
         side = "right" if moment > 0.5 * sum(panels[0].get_xlim()) else "left"
         panels[0].annotate(
-            f"{_all_of(dataset)} at {moment:.2f} s", (moment, 1.0),
+            f"{_all_of(dataset)} at {_moment(dataset, moment)}", (moment, 1.0),
             xycoords=panels[0].get_xaxis_transform(), xytext=(0, 3),
             textcoords="offset points", ha=side, va="bottom", fontsize=9.5,
         )  # fmt: skip
@@ -341,6 +371,22 @@ def signed_sizes(axes: Axes, sizes: np.ndarray) -> None:
         axes.yaxis.set_major_formatter(
             FuncFormatter(lambda value, _: "" if 0.0 < abs(value) < beside else f"{value:g}")
         )
+
+
+def limit_of(dataset: xr.Dataset, name: str) -> float:
+    """What ``limits`` of the scene allow for a load, in its unit; NaN without a limit."""
+    scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
+    limit = getattr(scene.limits, name)
+    return math.nan if limit is None else float(limit)
+
+
+def draw_limit(axes: Axes, limit: float, words: str) -> None:
+    """A dashed line at a limit, with its name at its left end; nothing at NaN."""
+    if math.isnan(limit):
+        return
+    axes.axhline(limit, color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 2)))
+    axes.annotate(words, (0.0, limit), xytext=(4, 2), xycoords=axes.get_yaxis_transform(),
+                  textcoords="offset points", color=VERMILLION, fontsize=9)  # fmt: skip
 
 
 _MOST_MARGIN = 1e3

@@ -189,9 +189,8 @@ def _still_off(scene: Scene, drive: DriveMargin, time: float) -> str:
         for where, winch in drive.conditions.winches.items()
         if turns_ever(winch) and time < winch.start_time - AT_ONCE
     ]
-    return f"; the least drive margin is that of {time:.4g} s, before {' and '.join(late)}" * bool(
-        late
-    )
+    told = f"; the least drive margin is that of {time:.4g} s, before {' and '.join(late)}"
+    return told if late else ""
 
 
 def _margin(drive: float, required: float) -> float:

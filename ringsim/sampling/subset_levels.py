@@ -79,7 +79,7 @@ class Repetition:
         passed = int(np.searchsorted(self.thresholds, response, side="right"))
         before, square = (self.shares[passed - 1], self.squares[passed - 1]) if passed else (1, 0)
         inside = self.states[passed] > response
-        square += _variance(inside, self.chains if passed else len(inside))
+        square += variance_of_level(inside, self.chains if passed else len(inside))
         return before * float(inside.mean()), float(np.sqrt(square))
 
 
@@ -108,7 +108,7 @@ def levels(
     ``samples`` are those of a level, a ``share`` of which passes to the next, at most ``most``.
     """
     found = [Repetition() for _ in range(replicates)]
-    running = {k: _simulation(found[k], samples, share, target, most) for k in range(replicates)}
+    running = {k: simulation_of(found[k], samples, share, target, most) for k in range(replicates)}
     waiting = {k: next(each) for k, each in running.items()}
     parents, anew, level, replicate, batches = [], [], [], [], list[slice]()
     begin, ended = 0, False
@@ -137,7 +137,7 @@ def levels(
     return Levels(of_parents, np.concatenate(anew), of_level, of_replicate, batches, found, ended)
 
 
-def _simulation(
+def simulation_of(
     found: Repetition, samples: int, share: float, target: float, most: int
 ) -> Generator[Batch, Answer, None]:
     """One simulation, which asks for batches and is sent their responses."""
@@ -159,7 +159,7 @@ def _simulation(
             bound = float(np.max(response, where=response < bound, initial=before))
             inside = response > bound
         probability *= float(inside.mean())
-        squares += _variance(inside, chains if level else samples)
+        squares += variance_of_level(inside, chains if level else samples)
         if last:
             found.probability, found.variation = probability, float(np.sqrt(squares))
             return
@@ -180,7 +180,7 @@ def _simulation(
         here, response = np.concatenate(course), np.concatenate(heights)
 
 
-def _variance(inside: NDArray[np.bool_], chains: int) -> float:
+def variance_of_level(inside: NDArray[np.bool_], chains: int) -> float:
     """Square of the coefficient of variation of a level's share; infinite if nothing is inside.
 
     ``inside`` are the states of all ``chains``, step after step; Au and Beck (2001), eqs. 27 to 29.

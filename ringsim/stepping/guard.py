@@ -12,7 +12,7 @@ from ringsim.stepping.instant import (
     Remembering,
     Scales,
     Strained,
-    exchanged,
+    of_ranges,
 )
 from ringsim.stepping.locks import StopContact
 from ringsim.variables import Cause, Reason
@@ -138,7 +138,7 @@ class Guard(Remembering):
         self._constant = solver.step_control == "constant"
         self._run: list[Instant] = []
         self._lost = self._driven = self._credit = 0.0
-        self._low, self._high = np.full((2, 4), [[np.inf], [-np.inf]])
+        self._low, self._high = [math.inf] * 4, [-math.inf] * 4
         self._worst = (0.0, 0.0)
 
     def judge(self, now: Instant) -> Reason:
@@ -162,13 +162,14 @@ class Guard(Remembering):
         stored = found.kinetic + found.elastic
         balance = stored - start.kinetic - start.elastic + self._lost - work
         kinds = [found.kinetic, found.elastic, found.work, self._driven]
-        self._low, self._high = np.fmin(self._low, kinds), np.fmax(self._high, kinds)
+        self._low = [min(pair) for pair in zip(self._low, kinds, strict=True)]
+        self._high = [max(pair) for pair in zip(self._high, kinds, strict=True)]
         if abs(balance) > abs(self._worst[1]):
             self._worst = (time, balance)
 
         # Works by their ways up and down: what loads gave stays in the structure when they turn
         # round, though their work passes zero later.
-        supplied = float(np.sum((self._high - self._low)[2:]))
+        supplied = sum(self._ranges()[2:])
         available = start.kinetic + start.elastic + self._credit
         available += max(supplied, self._scales.energy)
         if stored > BLOW_UP * available:
@@ -205,11 +206,14 @@ class Guard(Remembering):
             return reason
         return unresolved(self._run, self._scales.slack_tension)
 
+    def _ranges(self) -> list[float]:
+        return [high - low for low, high in zip(self._low, self._high, strict=True)]
+
     def _unbalanced(
         self, time: float, balance: float, least: float, factor: float, bound: str
     ) -> Reason:
         """Why an imbalance B in J is too large; X counts as ``least`` (J) at least."""
-        scale = max(least, exchanged(np.array([self._low, self._high])))
+        scale = max(least, of_ranges(*self._ranges()))
         # Not <=: an unknown balance (NaN) stops nothing.
         if not abs(balance) > factor * self._tolerance * scale:
             return Reason()

@@ -40,7 +40,11 @@ def exchanged(kinds: Array) -> float:
     It never falls: unlike the present work it is not emptied where loads change their sign, or
     where a winch takes what loads give.
     """
-    kinetic, elastic, loads, winches = np.ptp(kinds, axis=0)
+    return of_ranges(*np.ptp(kinds, axis=0))
+
+
+def of_ranges(kinetic: float, elastic: float, loads: float, winches: float) -> float:
+    """``exchanged``, of the ranges of these energies (J)."""
     return float(max(kinetic, elastic, loads + winches))
 
 

@@ -100,16 +100,17 @@ class Locks(Remembering):
         """A smaller step (s) in whose end the last V-joint of a plane locks, if a winch acts on
         that and this step goes on for long behind it; else None.  None is below ``least`` (s).
         """
-        step, ends = found.time - before.time, (before, found)
-        times, angles, rates = (
-            np.array([getattr(one, name) for one in ends]) for name in ("time", "angles", "rates")
-        )
-        wanted = []
+        step, wanted = found.time - before.time, list[float]()
         for row in self._acted_on:
-            left = ~self.deployed[row]
-            if left.any() and (found.angles[row, left] >= math.pi).all():
-                locked = lock_times(times, angles[:, [row]], rates[:, [row]])[0, left]
-                wanted.append(float(np.fmax.reduce(locked)) - before.time)
+            there = found.angles[row] >= math.pi
+            if (self.deployed[row] | there).all() and not self.deployed[row].all():
+                times, angles, rates = (
+                    np.array([getattr(one, name) for one in (before, found)])
+                    for name in ("time", "angles", "rates")
+                )
+                locked = lock_times(times, angles[:, [row]], rates[:, [row]])[0]
+                left = np.where(self.deployed[row], np.nan, locked)
+                wanted.append(float(np.fmax.reduce(left)) - before.time)
         # The first of two planes leaves its step to the other.
         ending = max(min(wanted, default=step) * (1.0 + 0.5 * _LATE), least)
         return ending if step - ending > 0.5 * _LATE * step else None

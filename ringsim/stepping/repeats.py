@@ -49,6 +49,7 @@ class Indicator(Remembering, ABC):
     def __init__(self, solver: Solver) -> None:
         self.limit = math.inf
         self._least = SHORTEST * solver.step
+        self._judged: tuple[Instant | None, float] = None, 0.0
 
     @abstractmethod
     def ratio(self, before: Instant, after: Instant) -> float:
@@ -61,6 +62,7 @@ class Indicator(Remembering, ABC):
     def shorter(self, before: Instant, after: Instant) -> float | None:
         """A smaller step in s to repeat this one with, or None if it is good enough."""
         step, ratio = after.time - before.time, self.ratio(before, after)
+        self._judged = after, ratio
         # A step comes back as a difference of times: a little more than what was asked for.
         if not ratio > _REFUSED or step <= self._least * (1.0 + 1e-6):
             return None
@@ -68,7 +70,10 @@ class Indicator(Remembering, ABC):
 
     def accept(self, before: Instant, after: Instant) -> None:
         """Learn from a step that is taken."""
-        step, ratio = after.time - before.time, self.ratio(before, after)
+        judged, ratio = self._judged
+        step = after.time - before.time
+        if after is not judged:
+            ratio = self.ratio(before, after)
         # 1e-3 stands for 0: from 0.2 on down ``GROWTH`` bounds the step, whatever the ratio is.
         growth = min(max(self.share(max(ratio, 1e-3)), FALL), GROWTH)
         self.limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf

@@ -78,6 +78,7 @@ class Run(Remembering):
         self._scene, self._watch = scene, watch
         self._faults, self._events = Faults(scene.faults), Events(scene)
         self._turn = scene.loads_turn_at
+        self._held = np.zeros(0, dtype=bool)
 
     def _set_out(self, first: Instant, scales: Scales, strained: Strained) -> None:
         """Begin with the first state; a ``history`` stands ready."""
@@ -195,6 +196,9 @@ class Run(Remembering):
         if self._locks is None:
             return
         locked, chain = self._latches.locked(self._locks.deployed), self._at
+        if np.array_equal(locked, self._held):
+            return
+        self._held = locked.copy()
         self._latches.hold(self._laws.switches)
         self._laws.follow()
         if self._cables is not None and chain is not None:

@@ -27,7 +27,7 @@ from ringsim.stepping.repeats import MotionSteps
 from ringsim.variables import Fate, Outcome, Status
 
 TIMES = np.linspace(0.0, 4.0, 41)
-SOON = {"structure.opening_angle": 120.0}
+SOON = {"structure.opening_angle": 150.0}
 
 
 def ring(**values: object) -> Scene:

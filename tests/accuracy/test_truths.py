@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringsim.campaign.studies import _quadrature
+from ringsim.campaign.studies import truths_of
 from ringsim.scene import load_scene
 
 pytestmark = pytest.mark.quick
@@ -12,5 +12,5 @@ pytestmark = pytest.mark.quick
 
 def test_the_quadrature_is_no_truth_of_a_damped_net() -> None:
     scene = load_scene("ring18").with_values({"structure.sections": 6})
-    assert _quadrature(scene)
-    assert not _quadrature(scene.with_values({"net.damping": 0.05}))
+    assert truths_of(scene)
+    assert not truths_of(scene.with_values({"net.damping": 0.05}))

@@ -18,7 +18,7 @@ LEAST, MOST = 0.05 - 3 * 0.011, 0.05 + 3 * 0.011
 
 def test_the_level_is_that_of_the_largest_index_of_all_columns_by_chance():
     random, none, found = np.random.default_rng(5), np.zeros(100, dtype=int), []
-    for _ in range(NOISE):
+    for _ in range(NOISE // 2):
         columns, output = random.random((20, 100)), random.random(100)
         columns[10:] = (columns[10:] > 0.5) + 0.0
         columns[1] = columns[0] + 0.1 * columns[1]  # alike: no two chances

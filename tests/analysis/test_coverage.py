@@ -9,7 +9,7 @@ from scipy.stats import binom
 from made import campaign, points, response
 from ringsim.analysis.design import placement
 from ringsim.analysis.intervals import ranks, share_bounds
-from ringsim.analysis.study import QUANTILES, STATISTICS, _share_interval, interval_of
+from ringsim.analysis.study import QUANTILES, STATISTICS, interval_of, placed_share_interval
 from ringsim.analysis.verdicts import bounds
 
 LIMIT = 2.3
@@ -47,7 +47,7 @@ def test_intervals_of_an_analysis_cover(kind, replicates, campaigns, truth):
         ends = interval_of(values, index, placed)
         own = values > LIMIT
         rows = dict(zip(STATISTICS, ends, strict=True)) | {
-            "share": _share_interval(own, index, placed)
+            "share": placed_share_interval(own, index, placed)
         }
         for name, true in truth.items():
             low, high = rows[name]

@@ -107,13 +107,13 @@ def test_what_is_far_out_is_told_in_words() -> None:
 def test_chance_makes_one_sample_in_ten_unusual() -> None:
     """Also of many places: some place is always far out."""
     random = np.random.default_rng(3)
-    values = random.random((2000, 17))
-    one = xr.Dataset(coords={"sample": np.arange(2000)})
+    values = random.random((1000, 17))
+    one = xr.Dataset(coords={"sample": np.arange(1000)})
     says = {"role": "input", "path": "a", "units": "m"}
     one["single"] = "sample", values[:, 0], says
-    shares = [np.mean(np.array(unusual(one, [*range(2000)])) != "nothing unusual")]
+    shares = [np.mean(np.array(unusual(one, [*range(1000)])) != "nothing unusual")]
     one = one.drop_vars("single").assign(many=(("sample", "section"), values, says))
-    far = np.array(unusual(one, [*range(2000)]))
+    far = np.array(unusual(one, [*range(1000)]))
     # Places alone: 1 - (1 - 0.1 / 17)^17 = 0.095; with the mean, which goes with them, more.
     shares.append(np.mean([each.startswith("section ") for each in far]))
     assert shares[0] == pytest.approx(0.1, abs=0.002)

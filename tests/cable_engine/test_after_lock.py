@@ -127,7 +127,7 @@ def test_the_stress_has_a_limit_too() -> None:
         "stop", "full", record__stress=True, limits__rod_stress=1e3, solver__end_time=0.3
     )
     assert found.fate is Fate.OVERLOADED
-    assert "more than limits.rod_stress = 1000 Pa" in found.reason
+    assert "more than limits.rod_stress = 0.001 MPa" in found.reason
 
 
 @for_each(

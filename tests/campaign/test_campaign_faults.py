@@ -15,7 +15,7 @@ POISON = {
     3: (1, Status.ERROR, "ZeroDivisionError: on purpose"),
     7: (2, Status.CRASHED, "SIGSEGV"),
     8: (3, Status.CRASHED, "exit code 7"),
-    20: (4, Status.TIMEOUT, "limits.timeout = 5 s"),
+    20: (4, Status.TIMEOUT, "limits.timeout = 2 s"),
     21: (5, Status.MEMORY, "memory"),
     30: (6, Status.DIVERGED, "asynchrony is not a number"),
     31: (7, Status.ERROR, "TypeError"),
@@ -23,7 +23,7 @@ POISON = {
     49: (9, Status.SOLVER_FAILED, "smaller step"),
 }
 SAMPLES = 50
-LIMITS = "[limits]\ntimeout = 5.0\nmemory = 6e8\n"
+LIMITS = "[limits]\ntimeout = 2.0\nmemory = 6e8\n"
 
 
 def ways():
@@ -48,7 +48,8 @@ def poisoned(tmp_path_factory):
 
     bench = Bench(tmp_path_factory.mktemp("poisoned"))
     file = bench.write_listed(ways(), more=LIMITS)
-    bench.run("campaign", file, "--out", "out", "--workers", 2, solver="fake_solver:poisoned")
+    start = ("campaign", file, "--out", "out", "--workers", 2)
+    bench.run(*start, solver="fake_solver:poisoned", fresh=True)
     return bench.result("out")
 
 
@@ -67,7 +68,7 @@ def test_poisoned_samples_are_kept_with_their_reason(poisoned, healthy):
     )
 
 
-@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_poison_gives_the_same_file_under_mpi(ranks, bench, poisoned, mpi):
     file = bench.write_listed(ways(), more=LIMITS)
     bench.run("campaign", file, "--out", "out", solver="fake_solver:poisoned", ranks=ranks)
@@ -75,8 +76,16 @@ def test_poison_gives_the_same_file_under_mpi(ranks, bench, poisoned, mpi):
 
 
 def test_log_of_a_crash_and_of_a_hang_says_where(bench):
-    file = bench.write_listed([2, 4, 30], more=LIMITS)
-    bench.run("campaign", file, "--workers", 1, "--out", "out", solver="fake_solver:poisoned")
+    """Of a process that holds nothing but the solver: the log ends with all that it has loaded."""
+    start = (
+        "campaign",
+        bench.write_listed([2, 4, 30], more=LIMITS),
+        "--workers",
+        1,
+        "--out",
+        "out",
+    )
+    bench.run(*start, solver="fake_solver:poisoned", fresh=True)
     logs = bench.result("out").log.values
     assert "Segmentation fault" in logs[0]
     for log in logs[:2]:

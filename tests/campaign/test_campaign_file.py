@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from loops import for_each
 
 from ringsim.campaign.specification import load_campaign
@@ -210,7 +211,8 @@ def test_replay_gives_the_stored_result_and_saves_it(bench):
     bench.run("campaign", bench.write(4), "--workers", 2, "--out", "out")
     printed = bench.run("replay", "out", 2, "--save", "two.nc")
     assert "identical to the stored result" in printed
-    assert (bench.folder / "two.nc").exists()
+    with xr.open_dataset(bench.folder / "two.nc") as saved:
+        assert saved.attrs["title"].endswith(", sample 2 of small")
     assert "young_modulus" in bench.run("replay", "out", 2, "--scene")
     assert "choose one from 0 to 3" in bench.run("replay", "out", 4, code=2)
     assert "absent: there is no such folder" in bench.run("replay", "absent", 0, code=2)

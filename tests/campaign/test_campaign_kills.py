@@ -124,7 +124,8 @@ class Drill:
                 self.hits_here += 1
         if self.process is not None:
             self.process.communicate(timeout=60)
-        if self.out.exists():
+            self.compare()
+        elif self.out.exists():
             self.bench.run(*self.command, ranks=self.ranks, solver="fake_solver:traced")
             self.compare()
 
@@ -167,11 +168,11 @@ def drill(kinds, *, ranks, seed, bench, undisturbed):
 
 def test_six_kills_cost_a_local_campaign_nothing(bench, undisturbed):
     kinds = [*LOCAL, "solver", "manager"]
-    assert drill(kinds, ranks=0, seed=1, bench=bench, undisturbed=undisturbed) == 6
+    assert drill(kinds, ranks=0, seed=7, bench=bench, undisturbed=undisturbed) == 6
 
 
 def test_four_kills_cost_an_mpi_campaign_nothing(bench, undisturbed, mpi):
-    assert drill([*MPI], ranks=2, seed=2, bench=bench, undisturbed=undisturbed) == 4
+    assert drill([*MPI], ranks=2, seed=5, bench=bench, undisturbed=undisturbed) == 4
 
 
 @pytest.mark.slow

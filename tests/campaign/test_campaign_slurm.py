@@ -16,7 +16,7 @@ import slurm_cluster
 from campaign_bench import MODULES, PATH, Bench, comparable, ranks_of, records
 
 SCRIPTS = Path(__file__).parents[2] / "slurm"
-SAMPLES = 60
+SAMPLES = 30
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def wait_for(condition, what, seconds=120):
     while time.monotonic() < end:
         if condition():
             return
-        time.sleep(0.3)
+        time.sleep(0.1)
     raise AssertionError(f"waited for {what} in vain")
 
 
@@ -109,7 +109,7 @@ def test_array_tasks_are_warned_leave_are_requeued_and_merge(cluster, bench, loc
 )
 def test_job_at_its_time_limit_is_requeued_until_all_is_done(script, option, cluster, bench, local):
     """Nobody cancels anything: Slurm itself warns of the end of the minute, within half of it."""
-    job = submit(cluster, bench, script, option, "--time=1", "--signal=B:USR1@30", seconds=1.5)
+    job = submit(cluster, bench, script, option, "--time=1", "--signal=B:USR1@30", seconds=3.0)
     wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "the time limit")
     assert done_in_all(bench) < SAMPLES
     finish(cluster, bench, job, seconds=400)

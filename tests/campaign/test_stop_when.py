@@ -70,7 +70,7 @@ def test_it_ends_there_for_any_number_of_workers(workers, ended, bench):
 
 def test_it_ends_there_under_mpi(ended, bench, mpi):
     write(bench)
-    bench.run("campaign", "small.toml", "--out", "out", ranks=3)
+    bench.run("campaign", "small.toml", "--out", "out", ranks=2)
     assert_same(bench, ended)
 
 

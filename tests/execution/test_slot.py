@@ -107,7 +107,7 @@ def test_run_that_was_suspended_with_its_supervisor_is_no_hang(slots):
     slot.submit(1, {})
     slot.poll()
     os.kill(process, signal.SIGSTOP)
-    time.sleep(2.0)
+    time.sleep(1.3)
     assert slot.poll() is None
     os.kill(process, signal.SIGCONT)
     assert awaited(slot).status is Status.OK

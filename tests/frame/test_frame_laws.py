@@ -36,7 +36,7 @@ def named(kind: str, scenes: dict[str, dict[str, object]]) -> list[object]:
 
 def check(scene: Scene) -> None:
     for name, found in apart(scene).items():
-        assert found.difference <= sum(found.errors) + FLOOR * found.largest, name
+        assert found.difference <= 2.0 * found.error + FLOOR * found.largest, name
 
 
 @pytest.mark.parametrize("values", named("forces", FORCES))

@@ -25,6 +25,7 @@ from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter, Readings
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
+from ringsim.stepping.repeats import Indicator
 from ringsim.stored_state import read_state
 
 
@@ -73,6 +74,9 @@ def inside(thing: Any) -> dict[Any, Any] | None:
     if isinstance(thing, Winches):
         # These begin anew with every step.
         own = {name: one for name, one in own.items() if name not in ("_start", "_held", "_ropes")}
+    if isinstance(thing, Indicator):
+        # Of a step that is asked about again.
+        own = {name: one for name, one in own.items() if name != "_judged"}
     if isinstance(thing, EnergyMeter):
         # Rooms are written before they are read.
         own = {name: one for name, one in own.items() if name != "_rooms"}
@@ -82,8 +86,8 @@ def inside(thing: Any) -> dict[Any, Any] | None:
     return own
 
 
-BEGUN_ANEW = "until", "_states", "_cables", "_next"
-"""Of cables see below: what they keep is of one step."""
+BEGUN_ANEW = "until", "_states", "_cables", "_next", "_held"
+"""Of cables see below: what they keep is of one step.  What has latched is looked at anew."""
 
 
 def parts(run: Storing) -> dict[str, Any]:

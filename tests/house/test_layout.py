@@ -79,3 +79,12 @@ def test_readme_installs_extras_that_exist() -> None:
 def test_ci_runs_the_test_block_of_the_readme() -> None:
     assert "pytest" in readme_block("tests")
     assert "<!-- tests -->" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_tests_import_public_names_alone() -> None:
+    """So that a function moves, or is written anew, without its tests."""
+    private = re.compile(r"^from ringsim\S* import .*(?<!\w)_[a-z]", re.MULTILINE)
+    found = [
+        path.name for path in (ROOT / "tests").rglob("*.py") if private.search(path.read_text())
+    ]
+    assert not found

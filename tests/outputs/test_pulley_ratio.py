@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,13 @@ from ringsim.cable.friction import BearingFriction
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winding import ConstantWinding
 from ringsim.core.chain import Chain
+from ringsim.layout.layout import layout_of
 from ringsim.outputs.cables import PulleyRatio
 from ringsim.outputs.family import Series
+from ringsim.outputs.meters import Meters, Reading
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
+from ringsim.stepping.instant import Energies
 
 HALF, OFFSET, RATIO, PLAN = 0.2889, 0.105, 0.04, np.radians(21.53959)
 """Of truss2: bar half and block offset (m), f / R, and the turn of the plan between sections."""
@@ -75,7 +77,11 @@ def reading(*, wound: float, jam: bool = False, speed: float = 1e-3) -> np.ndarr
     if jam:
         ropes = ropes.jam(0, 1, state.stored, state.wound)
     state = chain.state(ropes, points, np.zeros((4, 3)), np.array([[wound, 0.0]]), rate)
-    now: Any = SimpleNamespace(chain=state, planes=((1,),), angles=np.zeros((2, 1)))
+    still = np.zeros((2, 1))
+    now = Reading(
+        0.0, still, still, Energies(0.0, 0.0, 0.0, 0.0), chain=state, planes=((1,),),
+        meters=Meters(SCENE, layout_of(SCENE)),
+    )  # fmt: skip
     found = PulleyRatio().read(now)
     assert found is not None
     return found

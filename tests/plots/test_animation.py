@@ -43,7 +43,7 @@ def test_a_frame_shows_positions_time_and_who_is_ahead(computed: bool) -> None:
     """Orange the joint that is farthest ahead, purple the last, at the places of the run."""
     one = made_run(computed=computed)
     shape = shape_of(one, made_scene())
-    figure, show = stage(one, shape, animation._lags(one, shape))
+    figure, show = stage(one, shape, animation.by_lag(one, shape))
     show(5.0)
     words = [text.get_text() for text in figure.texts]
     assert any(" 5.00 s" in text and "100.0 degree open" in text for text in words)
@@ -69,7 +69,7 @@ def test_a_frame_shows_positions_time_and_who_is_ahead(computed: bool) -> None:
 def test_the_view_holds_the_whole_run() -> None:
     one = made_run(computed=True)  # it floats by 5 m
     shape = shape_of(one, made_scene())
-    figure, show = stage(one, shape, animation._lags(one, shape))
+    figure, show = stage(one, shape, animation.by_lag(one, shape))
     (left, right), (low, high) = figure.axes[0].get_xlim(), figure.axes[0].get_ylim()
     for time in np.linspace(0.0, 10.0, 7):
         show(float(time))
@@ -85,7 +85,7 @@ def test_stress_colours_every_rod() -> None:
     told = {"units": "Pa", "long_name": "stress"}
     one = one.assign_coords(rod=rods).assign(rod_stress=(("rod", "section", "time"), values, told))
     shape = shape_of(one, made_scene())
-    paint = animation._stresses(one, shape)
+    paint = animation.by_stress(one, shape)
     assert paint.label == "stress (MPa)"
     assert paint.factor * paint.values(3.0)["bars"].max() == pytest.approx(8.0)
     assert paint.norm.vmax == pytest.approx(8.0)

@@ -22,7 +22,7 @@ from ringsim.outputs.family import VARIABLES
 from ringsim.plots import style
 from ringsim.plots.campaign import endings
 from ringsim.plots.campaign.courses import lock_order, shares
-from ringsim.plots.campaign.endings import _grid, _laid, base_load, margin, motors, tension
+from ringsim.plots.campaign.endings import angle_grid, base_load, laid_on, margin, motors, tension
 from ringsim.plots.campaign.frame import shown
 from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
 from ringsim.plots.campaign.tornado import moves, named, one_by_one
@@ -388,7 +388,7 @@ def test_the_course_of_the_margin_begins_where_runs_begin() -> None:
         (np.array([20.0 + off, 90.0, 180.0 - off]), np.array([start, 3.0, 5.0]))
         for off, start in ((0.0, -0.5), (1e-14, 0.4), (3e-14, 2.0), (1.0, 1.0))
     ]
-    laid = np.array([_laid(_grid(rows), *row) for row in rows])
+    laid = np.array([laid_on(angle_grid(rows), *row) for row in rows])
     np.testing.assert_allclose(laid[:3, 0], [-0.5, 0.4, 2.0])
     np.testing.assert_allclose(laid[:3, -1], 5.0)
     assert np.isnan(laid[3, [0, -1]]).all()

@@ -11,8 +11,10 @@ from ringsim.analysis.courses import courses, ends
 from ringsim.plots.campaign.endings import latch_rate, lock_impulse, margin
 from ringsim.plots.campaign.endings import motors as motors_of_samples
 from ringsim.plots.drives_and_locks import least_rate, locks, motors
+from ringsim.plots.figures import figures_of
 from ringsim.plots.style import locked_time
-from ringsim.scene import Scene
+from ringsim.scene import Scene, load_scene
+from ringsim.simulation import simulate
 from ringsim.variables import Fate
 
 LEAST = 0.25
@@ -77,10 +79,31 @@ def test_locks_of_a_run_stand_by_section(campaign: xr.Dataset) -> None:
     names = ("lock_time", "latch_rate", "lock_impulse")
     for axes, name in zip(panels, names, strict=True):
         for row, line in zip(run[name].to_numpy(), axes.lines, strict=False):
-            assert line.get_xdata().tolist() == run["section"].values.tolist()
+            assert line.get_xdata().round().tolist() == run["section"].values.tolist()
             assert line.get_ydata() == pytest.approx(row)
+    upper, lower = (line.get_xdata() for line in panels[0].lines)
+    assert (lower > upper).all()  # planes that lock alike do not hide each other
     assert panels[1].lines[-1].get_ydata()[0] == LEAST
     assert len(locks(run.drop_vars(["latch_rate", "lock_impulse"])).axes) == 1
+
+
+def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
+    craft = {"mass": 20.0, "inertia": [3.0, 3.0, 2.0]}
+    values = {
+        "structure.sections": 3, "spacecraft": craft, "solver.end_time": 1.0,
+        "record.reactions": True, "record.positions": True,
+    }  # fmt: skip
+    run = simulate(load_scene("ring18-cable").with_values(values))
+    ((_, figure),) = figures_of(run, "base")
+    turn, place = figure.axes
+    known = run["base_rotation"].dropna("time")
+    way = run["position"].sel(point="upper corner 1").dropna("time")
+    for axes, wanted in ((turn, known), (place, way - way[..., 0])):
+        for row, line in zip(wanted.transpose("axis", "time").values, axes.lines, strict=False):
+            assert line.get_ydata()[: len(row)] == pytest.approx(row)
+    assert "spacecraft" in figure.get_suptitle()
+    still = run.assign(base_rotation=0.0 * run["base_rotation"])
+    assert not list(figures_of(still, "base"))
 
 
 def test_motors_of_a_run_have_a_panel_a_quantity(campaign: xr.Dataset) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import subprocess
 import sys
+from collections.abc import Callable
 
 import matplotlib as mpl
 import numpy as np
@@ -12,10 +14,11 @@ import xarray as xr
 from loops import for_each
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from ringsim.dataset import to_dataset
 from ringsim.outputs import VARIABLES
-from ringsim.plots import figures, registry
+from ringsim.plots import figures, registry, style
 from ringsim.plots.figures import PICTURES, draw_figures, figures_of, left_out
 from ringsim.plots.ring import ring
 from ringsim.plots.rods_and_cables import default_sections, rod_stress
@@ -30,6 +33,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import load_scene, scene_from_toml
 from ringsim.variables import Fate, Outcome, Status
 
+Drawn = Callable[..., tuple[Figure, bool]]
 DRAWINGS = [opening_angles, asynchrony, rod_stress, energy, ring, section_map]
 CHARTS = [opening_angles, asynchrony, rod_stress, energy, section_map]
 
@@ -52,11 +56,18 @@ def dashed_lines(axes) -> list[float]:
     return [float(line.get_xdata()[0]) for line in vertical]
 
 
-@pytest.mark.parametrize("draw", CHARTS)
-def test_time_axis_is_named_by_the_dataset(draw, deployed):
-    run = deployed.copy()
-    run["time"] = run["time"].assign_attrs(long_name="moment", units="s")
-    assert any(axes.get_xlabel() == "Moment (s)" for axes in draw(run).axes)
+@pytest.fixture(scope="module")
+def drawn(deployed: xr.Dataset, failed: xr.Dataset) -> Drawn:
+    """A figure of one of the two runs, drawn once, and whether that changed data or settings."""
+
+    @functools.cache
+    def drawn(draw: Callable[[xr.Dataset], Figure], *, well: bool = True) -> tuple[Figure, bool]:
+        run = deployed if well else failed
+        data, before = run.copy(deep=True), settings()
+        figure = draw(run)
+        return figure, not run.identical(data) or settings() != before
+
+    return drawn
 
 
 @pytest.mark.parametrize(
@@ -66,40 +77,45 @@ def test_time_axis_is_named_by_the_dataset(draw, deployed):
         (asynchrony, "asynchrony", "Some name (degree)"),
         (rod_stress, "rod_stress", "Some name (MPa)"),
         (energy, "work", "some name"),
+        (section_map, None, None),
     ],
 )
-def test_values_are_named_by_the_dataset(draw, name, label, deployed):
+def test_time_axis_and_values_are_named_by_the_dataset(draw, name, label, deployed):
     run = deployed.copy()
-    run[name] = run[name].assign_attrs(long_name="some name")
-    assert label in words(draw(run)).splitlines()
+    run["time"] = run["time"].assign_attrs(long_name="moment", units="s")
+    if name is not None:
+        run[name] = run[name].assign_attrs(long_name="some name")
+    figure = draw(run)
+    assert any(axes.get_xlabel() == "Moment (s)" for axes in figure.axes)
+    assert label is None or label in words(figure).splitlines()
 
 
 @pytest.mark.parametrize("draw", DRAWINGS)
-def test_title_names_the_scene_and_how_the_run_ended(draw, deployed, failed):
-    assert deployed.attrs["title"] in words(draw(deployed))
-    assert "Deployed after 17.58 s" in words(draw(deployed))
-    text = " ".join(words(draw(failed)).split())
+def test_title_names_the_scene_and_how_the_run_ended(draw, drawn, deployed):
+    text = words(drawn(draw)[0])
+    assert deployed.attrs["title"] in text
+    assert "Deployed after 17.58 s" in text
+    text = " ".join(words(drawn(draw, well=False)[0]).split())
     assert "Solver failed after 9.25 s: the step fell below its bound" in text
 
 
 @pytest.mark.parametrize("draw", CHARTS)
-def test_deployment_time_is_marked_only_if_there_is_one(draw, deployed, failed):
-    times = [time for axes in draw(deployed).axes for time in dashed_lines(axes)]
+def test_deployment_time_is_marked_only_if_there_is_one(draw, drawn, deployed):
+    times = [time for axes in drawn(draw)[0].axes for time in dashed_lines(axes)]
     assert times
     assert set(times) == {float(deployed.deployment_time)}
-    assert not [time for axes in draw(failed).axes for time in dashed_lines(axes)]
+    late = drawn(draw, well=False)[0]
+    assert not [time for axes in late.axes for time in dashed_lines(axes)]
 
 
 @pytest.mark.parametrize("draw", DRAWINGS)
-def test_drawing_leaves_data_and_settings_as_they_were(draw, deployed):
-    data, before = deployed.copy(deep=True), settings()
-    draw(deployed)
-    assert deployed.identical(data)
-    assert settings() == before
+def test_drawing_leaves_data_and_settings_as_they_were(draw, drawn):
+    assert not drawn(draw)[1]
+    assert not drawn(draw, well=False)[1]
 
 
-def test_every_section_of_both_planes_has_its_line(deployed):
-    figure = opening_angles(deployed)
+def test_every_section_of_both_planes_has_its_line(drawn, deployed):
+    figure = drawn(opening_angles)[0]
     upper, lower = figure.axes[0], figure.axes[1]
     for axes, plane in ((upper, "upper"), (lower, "lower")):
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
@@ -107,12 +123,23 @@ def test_every_section_of_both_planes_has_its_line(deployed):
         assert lines.get_array().tolist() == list(range(1, 19))
         for section, segment in enumerate(segments, start=1):
             wanted = deployed.opening_angle.sel(plane=plane, section=section)
-            np.testing.assert_array_equal(segment[:, 0], deployed.time)
-            np.testing.assert_array_equal(segment[:, 1], wanted)
+            np.testing.assert_array_equal(segment[:-1, 0], deployed.time)
+            np.testing.assert_array_equal(segment[:-1, 1], wanted)
+            assert segment[-1].tolist() == [float(deployed.final_time), 180.0]
 
 
-def test_deviations_add_up_to_nothing(deployed):
-    figure = opening_angles(deployed)
+def test_courses_of_a_deployed_ring_go_on_behind_its_last_record(deployed):
+    run = deployed.isel(time=slice(0, 170))  # up to 16.9 s
+    for axes, last in zip(opening_angles(run).axes[:4], (180.0, 180.0, 0.0, 0.0), strict=True):
+        for segment in axes.collections[0].get_segments():
+            assert segment[-2:, 0].tolist() == [float(run.deployment_time), float(run.final_time)]
+            assert segment[-2:, 1].tolist() == [last, last]
+    (line,) = (line for line in asynchrony(run).axes[0].lines if len(line.get_xdata()) > 2)
+    assert line.get_xydata()[-2].tolist() == [float(run.deployment_time), 0.0]
+
+
+def test_deviations_add_up_to_nothing(drawn):
+    figure = drawn(opening_angles)[0]
     shown = [c for axes in figure.axes[2:4] for c in axes.collections]
     total = sum(segment[:, 1] for lines in shown for segment in lines.get_segments())
     np.testing.assert_allclose(total, 0.0, atol=1e-11)  # 36 roundings of values up to 180
@@ -147,8 +174,8 @@ def test_the_map_shows_the_deviations_and_who_is_farthest_apart(deployed):
     assert {mark.get_xdata()[0] for mark in found.values()} == {deployed.time.values[at]}
 
 
-def test_locks_are_marked_at_their_times(deployed):
-    for axes, plane in zip(opening_angles(deployed).axes, ("upper", "lower"), strict=False):
+def test_locks_are_marked_at_their_times(drawn, deployed):
+    for axes, plane in zip(drawn(opening_angles)[0].axes, ("upper", "lower"), strict=False):
         marks = np.asarray(axes.collections[-1].get_offsets())
         np.testing.assert_array_equal(marks[:, 0], deployed.lock_time.sel(plane=plane))
         assert set(marks[:, 1]) == {180.0}
@@ -164,10 +191,11 @@ def test_a_peak_of_stress_at_the_lock_does_not_flatten_the_rest(peak, scale, dep
         assert np.nanmax(shown) < axes.get_ylim()[1]
 
 
-def test_the_rebound_does_not_set_the_scale_of_the_deviations(deployed):
+def test_the_rebound_does_not_set_the_scale_of_the_deviations(drawn, deployed):
     run = deployed.copy(deep=True)
     run["opening_angle"].values[0, 3, -1] = 90.0
-    limits = [[axes.get_ylim() for axes in opening_angles(r).axes[2:4]] for r in (deployed, run)]
+    both = drawn(opening_angles)[0], opening_angles(run)
+    limits = [[axes.get_ylim() for axes in figure.axes[2:4]] for figure in both]
     assert limits[0] == limits[1]
 
 
@@ -178,8 +206,8 @@ def test_stress_is_shown_at_the_boom_and_half_way_round(sections, chosen):
     assert default_sections(sections) == chosen
 
 
-def test_stress_lines_are_the_halves_of_the_diagonals_in_black_and_red(deployed):
-    for axes, diagonal in zip(rod_stress(deployed).axes, ("rising", "falling"), strict=False):
+def test_stress_lines_are_the_halves_of_the_diagonals_in_black_and_red(drawn, deployed):
+    for axes, diagonal in zip(drawn(rod_stress)[0].axes, ("rising", "falling"), strict=False):
         lines = [line for line in axes.lines if len(line.get_xdata()) > 2][:4]
         wanted = [
             deployed.rod_stress.sel(rod=f"diagonal_{diagonal}_{half}", section=section)
@@ -190,6 +218,33 @@ def test_stress_lines_are_the_halves_of_the_diagonals_in_black_and_red(deployed)
             np.testing.assert_array_equal(line.get_ydata(), 1e-6 * values)
         red = [mpl.colors.to_rgb(line.get_color())[0] > 0.5 for line in lines]
         assert red == [False, False, True, True]
+        # In grey dashes tell sections apart, and widths halves.
+        assert [line.get_linestyle() for line in lines] == ["-", "-", "--", "--"]
+        assert lines[0].get_linewidth() == lines[2].get_linewidth() > lines[1].get_linewidth()
+
+
+def test_limits_of_loads_are_drawn_and_within_the_axes(deployed, scene_of):
+    held = scene_of(18).with_values({"limits.rod_stress": 9e6, "record.stress": True})
+    for axes in rod_stress(deployed.assign_attrs(scene=held.to_toml())).axes:
+        assert [9.0, 9.0] in [list(line.get_ydata()) for line in axes.lines]
+        assert axes.get_ylim()[1] > 9.0
+        assert "limits.rod_stress = 9 MPa" in [text.get_text() for text in axes.texts]
+    assert not any("limits." in text.get_text() for text in rod_stress(deployed).findobj(Text))
+
+
+def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([1e6, 3e7], [1.0, 2.0])
+    axes.set_xlabel("Largest stress (Pa)")
+    axes.set_ylabel("Force (N)")
+    axes.set_title("of stress (Pa)")
+    style.in_readable_units(figure)
+    figure.draw_without_rendering()
+    told = [axes.get_xlabel(), axes.get_ylabel(), axes.get_title()]
+    assert told == ["Largest stress (MPa)", "Force (N)", "of stress (MPa)"]
+    for place, tick in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):
+        assert float(tick.get_text()) == pytest.approx(1e-6 * place)
 
 
 @for_each("sections", [[], [0], [1, 19], range(1, 8)])
@@ -204,8 +259,8 @@ def test_imbalance_is_what_the_energies_lack(deployed):
     np.testing.assert_allclose(lack, -drift, atol=1e-15)  # rounding of energies below 0.1 J
 
 
-def test_energies_are_drawn_in_the_unit_of_the_label(deployed):
-    upper, lower = energy(deployed).axes
+def test_energies_are_drawn_in_the_unit_of_the_label(drawn, deployed):
+    upper, lower = drawn(energy)[0].axes
     assert upper.get_ylabel() == "Energy (mJ)"
     np.testing.assert_array_equal(upper.lines[0].get_ydata(), 1e3 * deployed.work)
     assert lower.get_ylabel() == "Imbalance (µJ)"
@@ -213,7 +268,7 @@ def test_energies_are_drawn_in_the_unit_of_the_label(deployed):
     assert "2.3e-05" in lower.get_title(loc="left")
 
 
-@pytest.mark.parametrize(("sections", "closed"), [(1, False), (2, False), (6, True), (72, True)])
+@pytest.mark.parametrize(("sections", "closed"), [(1, False), (6, True), (72, True)])
 def test_no_words_leave_the_sheet_or_meet(sections, closed, scene_of, made_run):
     run = made_run(scene_of(sections, closed=closed))
     for draw in DRAWINGS:
@@ -237,19 +292,18 @@ OF_RINGS = {"opening_angles", "asynchrony", "section_map", "rod_stress", "ring",
 
 
 def test_only_figures_that_apply_are_written(tmp_path, deployed, scene_of, made_run):
-    names = {path.name for path in draw_figures(deployed, tmp_path / "all")}
-    assert names == {f"run-fig-{name}.png" for name in (*OF_RINGS, "locks")}
+    assert {picture.name for picture, _ in figures_of(deployed)} == OF_RINGS | {"locks"}
     plain = made_run(scene_of(6, parts=False), stress=False)
     paths = draw_figures(plain, tmp_path / "plain")
-    assert "run-fig-rod_stress.png" not in {path.name for path in paths}
-    assert len(paths) == len(OF_RINGS)
+    names = OF_RINGS - {"rod_stress"} | {"locks"}
+    assert {path.name for path in paths} == {f"run-fig-{name}.png" for name in names}
     for path in paths:
         assert path.read_bytes().startswith(b"\x89PNG")
     assert sorted((tmp_path / "plain").iterdir()) == sorted(paths)
 
 
 def test_runs_that_ended_early_are_drawn_as_far_as_they_got(tmp_path, failed, unfinished):
-    assert len(draw_figures(failed, tmp_path)) == len(OF_RINGS)
+    assert len([*figures_of(failed)]) == len(OF_RINGS)
     assert len(draw_figures(unfinished, tmp_path)) == len(OF_RINGS)
 
 

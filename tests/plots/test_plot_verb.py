@@ -34,6 +34,12 @@ def _two_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pictures, "PICTURES", few)
 
 
+@pytest.fixture
+def _stresses(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = [each for each in pictures.PICTURES if each.name in ("energy", "rod_stress")]
+    monkeypatch.setattr(pictures, "PICTURES", few)
+
+
 @pytest.mark.usefixtures("_two_figures")
 def test_figures_of_a_file_have_the_formats_asked_for(file: Path) -> None:
     done = ringsim("plot", str(file), "--plot-format", "pdf,svg,PNG")
@@ -96,6 +102,7 @@ SHORT = ("--set", "structure.sections=3", "--set", "boom=none", "--set", "solver
 HINT = "figures of stress need --set record.stress=true"
 
 
+@pytest.mark.usefixtures("_stresses")
 @pytest.mark.parametrize("more", [(), ("--set", "record.stress=true")], ids=["as it is", "stress"])
 def test_plotting_does_not_change_what_is_computed(tmp_path: Path, more: tuple[str, ...]) -> None:
     for name, plot in (("plain", ()), ("drawn", ("--plot",))):
@@ -109,6 +116,7 @@ def test_plotting_does_not_change_what_is_computed(tmp_path: Path, more: tuple[s
     assert (tmp_path / "drawn-fig-rod_stress.png").exists() == bool(more)
 
 
+@pytest.mark.usefixtures("_stresses")
 def test_what_has_no_stress_to_draw_is_not_told_how(tmp_path: Path) -> None:
     out = str(tmp_path / "run.nc")
     done = ringsim("run", "ring18", *SHORT, "--set", "rods.kind=ancf", "--plot", "--out", out)

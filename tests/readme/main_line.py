@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
+
+from preloaded import ringsim
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -22,9 +22,6 @@ def commands() -> list[list[str]]:
 
 def run(arguments: list[str], folder: Path) -> str:
     """Run ringsim in a folder; returns what it prints."""
-    done = subprocess.run(
-        [sys.executable, "-m", "ringsim", *arguments],
-        cwd=folder, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = ringsim(*arguments, folder=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -112,7 +112,10 @@ document.body.dataset.after = document.getElementById("told").textContent;
 
 
 @pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
-def test_a_print_has_three_moments_for_the_player(tmp_path: Path) -> None:
+def test_a_print_has_three_moments_for_the_player(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "PICTURES", figures.PICTURES[:1])
     text = page(made_campaign(8), "runs/made").replace("</body>", PRINT, 1)
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
     done = subprocess.run(
@@ -129,7 +132,10 @@ def test_a_print_has_three_moments_for_the_player(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
-def test_the_page_is_printed_with_what_it_folds(tmp_path: Path) -> None:
+def test_the_page_is_printed_with_what_it_folds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "PICTURES", figures.PICTURES[:1])
     save(made_campaign(8), tmp_path / "campaign.nc")
     out = tmp_path / "made.html"
     words = ["report", str(tmp_path / "campaign.nc"), "--out", str(out), "--pdf"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from made_campaign import made_campaign, made_scene
+from made_campaign import TIMES, made_campaign, made_scene
 
 from read_page import Page
 from ringsim.analysis.comparison import compare
@@ -20,6 +20,7 @@ from ringsim.dataset import save
 from ringsim.plots.comparison import figures_of_both, pairs, values
 from ringsim.report.page import comparison_page
 from ringsim.report.shell import LARGEST
+from ringsim.variables import Fate
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +128,47 @@ def test_figures_draw_the_samples_of_both(both: tuple[xr.Dataset, xr.Dataset]) -
         count = known[: len(line.get_xdata())]
         middle = np.nanmedian(rows[:, : len(count)][:, count], axis=0)
         assert line.get_ydata()[count] == pytest.approx(middle)
+
+
+def test_what_is_over_counts_on_in_the_courses(both: tuple[xr.Dataset, xr.Dataset]) -> None:
+    one, late = both[0].isel(sample=range(4)).copy(deep=True), TIMES > 6.0
+    angles = one["opening_angle"].transpose("sample", "plane", "section", "time").to_numpy()
+    tensions = one["cable_tension"].transpose("sample", "plane", "span", "time").to_numpy()
+    for recorded in (angles, tensions):  # three of four are deployed at 6 s
+        recorded[:3, ..., late] = np.nan
+    one["final_time"][:3], one["deployment_time"][:3] = 6.0, 6.0
+    found = compare(one, both[1], ("ground", "flight"))
+    (figure,) = (figure for name, _, figure in figures_of_both(found, one, both[1])
+                 if name == "courses")  # fmt: skip
+    drawn = {" ".join(a.get_ylabel().split()): a.lines[0].get_xydata() for a in figure.axes}
+    time, opening = drawn["Mean opening angle (degree)"].T
+    assert opening[time > 6.0] == pytest.approx(180.0)
+    time, tension = drawn["Largest cable tension (N)"].T
+    held = tensions.max(axis=(1, 2))[..., ~late][:, -1]
+    ends = np.append(held[:3], tensions[3].max(axis=(0, 1))[-1])
+    assert tension[-1] == pytest.approx(np.median(ends))
+    assert "What is over counts on" in figure.legends[0].get_title().get_text()
+
+
+def test_samples_that_were_cut_off_are_told_and_what_differs_comes_first(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    one = both[0].copy(deep=True)
+    one["outcome"][:2] = int(Fate.CUT_OFF)
+    told = "ground: solver.end_time cut off 2 of 8 samples: "
+    text = comparison_page(compare(one, both[1], ("ground", "flight")), one, both[1])
+    assert told in text
+    assert text.index("<h1>") < text.index('id="settings"') < text.index('id="requirements"')
+    assert "cut off" not in "\n".join(compared(compare(*both)))
+
+
+def test_titles_of_figures_fit_their_sheets(both: tuple[xr.Dataset, xr.Dataset]) -> None:
+    found = compare(*both, ("ground-8m-hot-2", "flight-8m-cold1"))
+    for _, _, figure in figures_of_both(found, *both):
+        figure.draw_without_rendering()
+        (title,) = (text for text in figure.texts if text.get_weight() == "bold")
+        for text in (title, *(axes.title for axes in figure.axes)):
+            assert text.get_window_extent().x1 < figure.bbox.x1
 
 
 def test_two_runs_are_drawn_over_time(both: tuple[xr.Dataset, xr.Dataset]) -> None:

@@ -29,6 +29,7 @@ from told_numbers import (
     bootstrap,
     bound,
     correlation_interval,
+    estimate_agrees,
     interval_agrees,
     quantile_interval,
     share_interval,
@@ -191,8 +192,8 @@ def outcomes(file: File, rows: list[dict[str, str]]) -> None:
         # What lost ones would have done nobody knows: none of them may be of the kind, or all.
         count, more = int(own.sum()), 0 if row["outcome"].startswith("failed") else gone
         assert row["samples"] == f"{count} of {total}" + f" ({more} failed)" * bool(more)
-        agrees(row["share"], count / total)
         ends = share_interval(count, total)[0], share_interval(count + more, total)[1]
+        estimate_agrees(row["share"], count / total, ends)
         interval_agrees(row["95 % interval"], ends)
         for part in (25, 50, 75):
             first = run[: round(part / 100 * len(run))]
@@ -219,7 +220,9 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
 
         run, worse = used + lost, bad + lost  # lost ones violate it, or keep to it
         ends = bound(run - worse, run, level)[0], bound(run - bad, run, level)[1]
-        interval_agrees(row["one-sided bounds"], ends)
+        told = [f"at least {ends[0]:.4g}", f"at most {ends[1]:.4g}"]
+        decisive = {"met": told[0], "not met": told[1], "not yet shown": ", ".join(told)}
+        assert row["surely"] == decisive[word(ends)]
         assert row["verdict"] == word(ends)
         if lost:
             alone = word(bound(used - bad, used, level))
@@ -256,7 +259,7 @@ def outputs(file: File, rows: list[dict[str, str]]) -> None:
         values, run = file.of(name), int((file.ok | file.lost).sum())
         assert row["used"] == (str(run) if len(values) == run else f"{len(values)} of {run}")
         assert row["unit"] == ("" if file.units[name] == "1" else file.units[name])
-        agrees(row["mean"], values.mean())
+        estimate_agrees(row["mean"], values.mean(), ends_of(row))
         near(row["95 % interval"], bootstrap(values, "mean"))
         agrees(row["std. dev."], values.std(ddof=1))
         for word, level in (("5 %", 0.05), ("median", 0.5), ("95 %", 0.95)):
@@ -460,6 +463,12 @@ def test_the_report_says_what_the_file_holds(told: tuple[File, list[str], str, l
     assert kept == (not short and not any(file.violating(n).any() for n in file.wanted))
 
 
+def ends_of(row: dict[str, str]) -> tuple[float, float]:
+    """The interval that a row tells."""
+    low, high = row["95 % interval"].split(" .. ") if row["95 % interval"] != "-" else ("nan",) * 2
+    return float(low), float(high)
+
+
 def statistics(file: File, rows: list[dict[str, str]]) -> None:
     """The table with a row a statistic."""
     assert {"mean", "standard deviation", "minimum"} <= {row["statistic"] for row in rows}
@@ -468,12 +477,13 @@ def statistics(file: File, rows: list[dict[str, str]]) -> None:
         values = file.of(name)
         levels = {"quantile 05": 0.05, "median": 0.5, "quantile 95": 0.95}
         if word in levels:
-            agrees(row["estimate"], np.quantile(values, levels[word]))
+            estimate_agrees(row["estimate"], np.quantile(values, levels[word]), ends_of(row))
             interval_agrees(row["95 % interval"], quantile_interval(values, levels[word]))
         elif word in ("mean", "standard deviation"):
             # Of the spread there are several good intervals, which differ by their ends' tails.
             of, most = ("mean", 0.1) if word == "mean" else ("std", 0.4)
-            agrees(row["estimate"], values.mean() if word == "mean" else values.std(ddof=1))
+            value = values.mean() if word == "mean" else values.std(ddof=1)
+            estimate_agrees(row["estimate"], value, ends_of(row))
             near(row["95 % interval"], bootstrap(values, of), most)
         else:
             end, sample = values.min() if word == "minimum" else values.max(), int(row["in sample"])

@@ -123,6 +123,7 @@ def test_the_page_has_no_figure_of_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     assert 'id="figure-tornado"' not in text
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_a_page_that_would_be_too_large_has_pictures_for_lines(monkeypatch) -> None:
     campaign = made_campaign(8)
     lines = page(campaign, "runs/made")
@@ -167,7 +168,7 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     at = cells.index("deployed")
     low, high = share_interval(4, 7)[0], share_interval(6, 7)[1]
     assert cells[at + 1 : at + 4] == [
-        "4 of 7 (2 failed)", f"{4 / 7:.4g}", f"{low:.4g} .. {high:.4g}"
+        "4 of 7 (2 failed)", f"{4 / 7:.2f}", f"{low:.2f} .. {high:.2f}"
     ]  # fmt: skip
     at = cells.index("outcome is deployed")
     assert cells[at + 6 : at + 9] == ["5", "1", "2"]

@@ -29,13 +29,27 @@ def agrees(text: str, value: float, digits: int = 4) -> None:
     )  # fmt: skip
 
 
+def estimate_agrees(
+    text: str, value: float, ends: tuple[float, float], digits: int = 4
+) -> None:  # fmt: skip
+    """The same, to two digits of half of its interval where these are fewer."""
+    half = 0.5 * (ends[1] - ends[0])
+    if not half > 0.0:
+        agrees(text, value, digits)
+        return
+    coarsest = 10.0 ** (math.floor(math.log10(half)) - 1)
+    allowed = 0.51 * max(coarsest, 10.0 ** (1 - digits) * abs(value)) + 1e-12
+    assert abs(float(text) - value) <= allowed, (text, value, ends)
+    _, _, decimals = text.partition(".")
+    assert "e" in text or not decimals or 10.0 ** -len(decimals) > 0.09 * coarsest, (text, ends)
+
+
 def interval_agrees(text: str, ends: tuple[float, float], digits: int = 4) -> None:
     if np.isnan(ends).all():
         assert text == "-", (text, ends)
         return
-    low, high = text.split(" .. ")
-    agrees(low, ends[0], digits)
-    agrees(high, ends[1], digits)
+    for word, end in zip(text.split(" .. "), ends, strict=True):
+        estimate_agrees(word, end, ends, digits)
 
 
 def share_interval(count: int, of: int) -> tuple[float, float]:

@@ -7,11 +7,11 @@ import pytest
 from scipy.stats import binom, norm
 
 from ringsim.analysis.intervals import share_interval
-from ringsim.analysis.tails import DISAGREE, _unled, agreement, replicated_interval
+from ringsim.analysis.tails import DISAGREE, agreement, bound_of_first_levels, replicated_interval
 from ringsim.cable.friction import BearingFriction
 from ringsim.rigid.drive import Drive
 from ringsim.rigid.mechanism import Mechanism
-from ringsim.sampling.subset_levels import Answer, Repetition, _simulation
+from ringsim.sampling.subset_levels import Answer, Repetition, simulation_of
 from ringsim.scene import load_scene
 
 AXES = 18
@@ -20,7 +20,7 @@ AXES = 18
 def simulated(response, rng, *, target, samples, share=0.1, axes=AXES, most=12):
     """One simulation of a response of points in standard normal space, shape (n, axes)."""
     found, points = Repetition(), np.empty((0, axes))
-    simulation = _simulation(found, samples, share, target, most)
+    simulation = simulation_of(found, samples, share, target, most)
     batch = next(simulation)
     while True:
         new = batch.anew * rng.standard_normal((len(batch.parents), axes))
@@ -136,7 +136,7 @@ def test_replicates_that_found_different_parts_of_the_event_disagree(replicates,
         ]
         each = np.array([one.probability for one in found])
         chains = np.array([one.variation for one in found])
-        unled = _unled(found, 5.0)
+        unled = bound_of_first_levels(found, 5.0)
         # 1 - 0.025 ** (1 / samples): none of so many was in it.
         assert unled >= 1.0 - 0.025 ** (1.0 / (200 * replicates))
         signs += agreement(each, chains) < DISAGREE

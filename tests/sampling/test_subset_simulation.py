@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from ringsim.refusal import InputError
 from ringsim.sampling.designs.levels import SubsetSimulation
-from ringsim.sampling.subset_levels import _variance
+from ringsim.sampling.subset_levels import variance_of_level
 
 AXES = dict.fromkeys("abcdefgh")
 
@@ -114,9 +114,9 @@ def test_points_do_not_depend_on_what_comes_after():
 def test_chains_that_stand_still_are_less_certain():
     """Equal states along a chain count once: all are worth no more than one a chain."""
     inside = np.repeat(np.arange(100) < 20, 1)
-    alone = _variance(inside, 100)
+    alone = variance_of_level(inside, 100)
     assert alone == pytest.approx(0.8 / (0.2 * 100))
-    still = _variance(np.tile(inside, 10), 100)
+    still = variance_of_level(np.tile(inside, 10), 100)
     assert still == pytest.approx(alone)
 
 

@@ -13,7 +13,7 @@ from loops import for_each
 
 from ringsim.analysis.stability import ENDED, OK
 from ringsim.campaign.panels import Panel, by_engines, panels_over, sweep_of
-from ringsim.campaign.studies import _pieces
+from ringsim.campaign.studies import pieces_of
 from ringsim.cli import cli
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
@@ -178,7 +178,7 @@ def test_an_axis_that_shapes_the_result_takes_a_campaign_for_each_value(shaping)
     ends = sweep_of(scene, "solver.end_time=30..40", points=2)
     speed = sweep_of(scene, f"{SPEED}=0.1..0.3", points=2)
     x, y = {"x": (sections, speed), "y": (speed, sections), "both": (sections, ends)}[shaping]
-    pieces = _pieces(Panel("p", "p", scene, x, y))
+    pieces = pieces_of(Panel("p", "p", scene, x, y))
     assert len(pieces) == {"x": 3, "y": 3, "both": 6}[shaping]
     cells = [(one, other) for piece in pieces for one, other, _ in piece.cells]
     assert sorted(cells) == sorted(Panel("p", "p", scene, x, y).cells())

@@ -66,7 +66,7 @@ def test_patience_ends_without_ropes_alone() -> None:
 def test_a_run_tells_that_its_patience_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load_scene("ring18").with_values(
         {"structure.sections": 3, "structure.aspect_ratio": 1.0, "net": "none", "boom": "none",
-         "loads.force": 0.03}
+         "loads.force": 0.03, "structure.opening_angle": 150.0}
     )  # fmt: skip
     assert "accepted as they were" not in run(scene).reason
     monkeypatch.setattr(repeats, "PATIENCE", 1)

@@ -124,8 +124,8 @@ def margin(campaign: xr.Dataset) -> Figure:
     angles = read["opening_angle"].mean(("plane", "section")).transpose("sample", "time").to_numpy()
     margins = read["drive_margin"].transpose("sample", "time").to_numpy()
     rows = [_over_angle(*each) for each in zip(angles, margins, strict=True)]
-    grid = _grid(rows)
-    laid = np.array([_laid(grid, *row) for row in rows])
+    grid = angle_grid(rows)
+    laid = np.array([laid_on(grid, *row) for row in rows])
     bands_by_ending(lower, grid, laid, words)
     style.margin_axis(lower, np.append(laid, values.min()))
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
@@ -167,7 +167,8 @@ def _over_angle(angle: Array, margins: Array) -> tuple[Array, Array]:
     return angle[grows], margins[grows]
 
 
-def _grid(rows: list[tuple[Array, Array]]) -> Array:
+def angle_grid(rows: list[tuple[Array, Array]]) -> Array:
+    """Angles from the least to the largest of all runs, deg; rows are angles and margins."""
     known = [angle for angle, _ in rows if len(angle)]
     low = min((float(angle[0]) for angle in known), default=0.0)
     return np.linspace(low, max((float(angle[-1]) for angle in known), default=180.0), _ANGLES)
@@ -177,8 +178,8 @@ _SAME_ANGLE = 1e-6
 """Difference of angles that is none, deg: round-off is 1e-13, a run's step 1e-2."""
 
 
-def _laid(grid: Array, angle: Array, margins: Array) -> Array:
-    """NaN where a run has not been."""
+def laid_on(grid: Array, angle: Array, margins: Array) -> Array:
+    """Margins over angle on a grid of angles; NaN where a run has not been."""
     if not len(angle):
         return np.full(len(grid), np.nan)
     # Runs begin at one angle but for round-off, there where margins often are least.
@@ -288,7 +289,7 @@ def tension(campaign: xr.Dataset) -> Figure:
     planes = [p for p in found["plane"].values.tolist() if found.sel(plane=p).notnull().any()]
     figure = Figure(figsize=(8.4, 2.3 * len(planes) + 1.3))
     grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    worst, names = _worst(campaign), ""
+    worst, names, limit = _worst(campaign), "", style.limit_of(campaign, "tension")
     for plane, axes in zip(planes, grid, strict=True):
         own = found.sel(plane=plane).transpose("sample", "span")
         own = own.dropna("span", how="all").dropna("sample", how="all")
@@ -301,6 +302,7 @@ def tension(campaign: xr.Dataset) -> Figure:
             names = f"largest tension: sample {worst}"
             axes.plot(own["span"], own.sel(sample=worst), color=style.INK, linewidth=0.9,
                       linestyle=(0, (3, 1.5)), label=names)  # fmt: skip
+        style.draw_limit(axes, limit, f"limits.tension = {limit:g} N")
         axes.set_title(f"{plane} cable", fontsize=9.5)
         axes.xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     grid[0].set_ylim(bottom=0.0)  # all panels share it

@@ -42,7 +42,7 @@ from ringsim.plots.campaign.frame import (
 )
 from ringsim.plots.campaign.tornado import is_one_by_one
 from ringsim.plots.registry import picture
-from ringsim.tables import unit_behind
+from ringsim.tables import unit_behind, with_unit
 
 _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
@@ -98,9 +98,10 @@ def distributions(campaign: xr.Dataset) -> Figure:
         for word, limit in limits(campaign, name):
             axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (5, 2)), linewidth=1.3)
             # Above the frame, where no curve runs.
-            axes.annotate(f"{word} {limit:g}", (limit, 1.0), xytext=(0, 2), ha="center",
+            units = str(campaign[name].attrs.get("units", "1"))
+            axes.annotate(f"{word} {with_unit(f'{limit:g}', units)}", (limit, 1.0), ha="center",
                           color=style.VERMILLION, xycoords=axes.get_xaxis_transform(),
-                          textcoords="offset points", fontsize=9)  # fmt: skip
+                          textcoords="offset points", xytext=(0, 2), fontsize=9)  # fmt: skip
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         style.plain_numbers(axes.xaxis)

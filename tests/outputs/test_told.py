@@ -1,0 +1,39 @@
+"""Main numbers of a run in words: their unit, their digits, and how far they are from limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ringsim.outputs.balance import summary
+from ringsim.outputs.recorder import below_limits
+from ringsim.scene import load_scene
+
+
+def test_numbers_end_with_the_digits_of_their_error_bars() -> None:
+    values = {
+        "deployment_time": np.array(32.4713), "deployment_time_error": np.array(0.02),
+        "peak_rod_stress": np.array(3.01834e7), "peak_rod_stress_error": np.array(3.6e5),
+        "peak_tension": np.array(31.968),
+    }  # fmt: skip
+    told = {name: " ".join(text.split()) for name, text in summary(values, {}).items()}
+    assert told["deployment_time"] == "32.47 s +- 0.02"
+    assert told["peak_rod_stress"] == "30.18 MPa +- 0.36"
+    assert told["peak_tension"] == "31.968 N"  # no error is known
+
+
+def test_loads_are_told_by_how_far_they_stay_below_their_limits() -> None:
+    limits = {"limits.tension": 40.0, "limits.rod_stress": 3e7, "record.stress": True}
+    scene = load_scene("ring18-cable").with_values(limits)
+    values = {
+        "cable_tension": np.array([[[np.nan, 12.0, 30.0]]]), "peak_tension": np.array(20.0),
+        "rod_stress": np.array([[[1e6, 2e6]]]), "peak_rod_stress": np.array(2.7e7),
+    }  # fmt: skip
+    # Behind the last lock a tension counts as well.
+    assert sorted(below_limits(scene, values)) == [
+        "largest rod stress stays 10 % below limits.rod_stress = 30 MPa",
+        "largest tension stays 25 % below limits.tension = 40 N",
+    ]
+    assert not list(below_limits(load_scene("ring18-cable"), values))
+    values["peak_tension"] = np.array(41.0)  # its outcome is "overloaded", and says so
+    (stress,) = below_limits(scene, values)
+    assert "stress" in stress
