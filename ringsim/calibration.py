@@ -34,7 +34,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
     """
     if "opening_angle" not in type(scene.structure).model_fields:
         raise InputError(
-            f'structure.kind = "{kind_of(scene.structure)}" has no opening_angle to determine'
+            f'structure.kind = "{kind_of(scene.structure)}" has no opening_angle to find'
         )
     opened: float = scene.structure.opening_angle  # type: ignore[attr-defined]
     if not (math.isfinite(time) and time > 0.0):
@@ -80,7 +80,8 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         middle = 0.5 * (low + high)
         if high - low < _CLOSE:
             raise InputError(
-                f"a deployment time of {time:g} s is never met: near {low:.6g} deg it jumps past it"
+                f"a deployment time of {time:g} s is not possible: near {low:.6g} deg the "
+                "deployment time jumps past it"
             )
         found = excess(middle)
         low, high, slow = (middle, high, found) if found >= 0.0 else (low, middle, slow)

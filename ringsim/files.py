@@ -52,7 +52,7 @@ def read_text(path: Path | Traversable) -> str:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read: {reason}") from None
     if len(text) > _LONGEST_TEXT:
-        raise InputError(f"{path}: longer than {_LONGEST_TEXT:,} letters: not a file of ringsim's")
+        raise InputError(f"{path}: longer than {_LONGEST_TEXT:,} letters: not a file of ringsim")
     return text
 
 
@@ -94,7 +94,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source}: not valid TOML: {error}; correct that line") from None
     except RecursionError:
-        raise InputError(f"{source}: its lists or tables nest too deeply") from None
+        raise InputError(f"{source}: its lists or tables are nested too deeply") from None
     except ValueError as error:
         raise InputError(f"{source}: a number cannot be read: {error}") from None
 
@@ -126,7 +126,7 @@ def require_file(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def writing(path: Path, cure: str = "make room or choose another folder") -> Iterator[None]:
+def writing(path: Path, cure: str = "free some space or choose another folder") -> Iterator[None]:
     """Refuse, with the cure, every OSError while a file is written, and the RuntimeError by which
     netCDF4 tells of a full disk.
     """

@@ -48,8 +48,8 @@ def parse_value(text: str, where: str) -> Any:
     except (ValueError, RecursionError) as error:
         if text.startswith(("{", "[")):
             raise InputError(
-                f"{where} = {shorten(text)}: no table or list as TOML writes them ({error}): write "
-                'for example { kind = "stall", speed = 0.1 }'
+                f"{where} = {shorten(text)}: not a valid TOML table or list ({error}): write for "
+                'example { kind = "stall", speed = 0.1 }'
             ) from None
         return text
     return table["value"] if len(table) == 1 else text

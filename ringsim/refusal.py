@@ -133,7 +133,7 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         case "union_tag_invalid":
             given = value.get("kind") if isinstance(value, dict) else limits["tag"]
             hint = known_or_nearest(str(given), _kinds(field))
-            return f"{where}.kind = {show(given)} is not a kind of it ({hint})"
+            return f"{where}.kind = {show(given)} is not an available kind ({hint})"
         case "union_tag_not_found":
             choices = " or ".join(map(show, _kinds(field)))
             return f"{where}.kind is missing: say which kind it is with kind = {choices}"

@@ -188,7 +188,7 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
         return outcome
     slips, bounds, excesses = zip(*faded.values(), strict=True)
     remark = (
-        f"; pulley friction fades, tension up to {max(excesses):.0f} % too high: "
+        f"; pulley friction is smoothed, tension up to {max(excesses):.0f} % too high: "
         f"{' and '.join(faded)} = {max(slips):.2g} m/s must be at most {min(bounds):.2g} m/s"
     )
     return replace(outcome, reason=outcome.reason + remark)

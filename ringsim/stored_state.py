@@ -73,8 +73,8 @@ def read_state(path: str | Path, at: float | None = None) -> StoredState:
         raise InputError(f"{path}: cannot be read as netCDF: {error}") from None
     if "state" not in data:
         raise InputError(
-            f"{path}: holds no states: run its scene again with --set record.state_interval=1 (or "
-            "another number of seconds)"
+            f"{path}: has no stored states: run its scene again with --set "
+            "record.state_interval=1 (or another number of seconds)"
         )
     state, times = data["state"], data["state_time"].to_numpy()
     if int(state.attrs["format"]) != FORMAT:
@@ -85,8 +85,8 @@ def read_state(path: str | Path, at: float | None = None) -> StoredState:
     scene = scene_from_toml(data.attrs["scene"], source=str(path))
     if state.attrs["layout"] != layout_fingerprint(scene):
         raise InputError(
-            f"{path}: was written by a version of ringsim that numbers the parts of a structure in "
-            "another way: run its scene again"
+            f"{path}: was written by another version of ringsim, whose states cannot be used: "
+            "run its scene again"
         )
     number = len(times) - 1 if at is None else int(np.argmin(np.abs(times - at)))
     if at is not None and not abs(times[number] - at) <= _SAME * max(at, 1.0):
@@ -111,7 +111,9 @@ def _told(times: np.ndarray[Any, Any]) -> str:
     return f"{', '.join(words)} s"
 
 
-_CANNOT = {"full": "what exudyn's integrator, dampers and connectors remember is not stored"}
+_CANNOT = {
+    "full": "the internal state of exudyn's integrator, dampers and connectors cannot be stored"
+}
 """Why fidelities store no states."""
 
 
@@ -129,19 +131,19 @@ def require_fit(start: StoredState | None, scene: Scene, fidelity: str) -> None:
     if fidelity != start.engine:
         raise InputError(
             f'fidelity = "{fidelity}": {start.name} is of the engine "{start.engine}", and no '
-            f'other can go on from it: choose fidelity = "{start.engine}"'
+            f'other can continue from it: choose fidelity = "{start.engine}"'
         )
     if scene.solver.error_bars:
         raise InputError(
-            "solver.error_bars = true: a run that goes on from a stored state has no second run of "
-            "its past: set it to false, and compare with a run of smaller steps"
+            "solver.error_bars = true: error bars are not available for a run that continues "
+            "from a stored state: set it to false, and compare with a run with smaller steps"
         )
     changes = start.changes_in(scene)
     for path, (before, now) in changes.items():
         if path.endswith(".initial_slack"):
             raise InputError(
-                f"{path} = {show(now)}: says how a run begins, and {start.name} is behind that: "
-                f"keep {show(before)}, or start without --from"
+                f"{path} = {show(now)}: this value is for the start of a run, which {start.name} "
+                f"has passed: keep {show(before)}, or start without --from"
             )
     wanted = layout_fingerprint(start.scene)
     if layout_fingerprint(scene) == wanted:
@@ -152,8 +154,8 @@ def require_fit(start: StoredState | None, scene: Scene, fidelity: str) -> None:
     before, now = changes[path] if culprit else (None, None)
     words = f"{path} = {_shown(now)}" if culprit else path
     raise InputError(
-        f"{words}: {start.name} has another layout ({path} was {_shown(before)}), so that its "
-        "numbers are those of other parts: keep that, or start without --from"
+        f"{words}: {start.name} has another structure ({path} was {_shown(before)}), so its "
+        "state does not fit: keep that value, or start without --from"
     )
 
 

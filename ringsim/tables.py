@@ -49,7 +49,7 @@ class Table(NamedTuple):
 def slim(table: Table) -> Table:
     """A table without the columns that say nothing.
 
-    >>> slim(Table(("output", "lost"), [("peak", "-"), ("time", "-")])).head
+    >>> slim(Table(("output", "failed"), [("peak", "-"), ("time", "-")])).head
     ('output',)
     """
     kept = [k for k in range(len(table.head)) if any(row[k] not in ("", "-") for row in table.rows)]

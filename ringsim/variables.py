@@ -142,8 +142,8 @@ class Fidelity(Code):
 
 
 GONE = {
-    "ideal": "a ring of rigid rods, which knew neither asynchrony nor stress, is no fidelity any "
-    'more: choose fidelity = "frame"'
+    "ideal": "rings of rigid rods (without asynchrony and stress) are no longer available: choose "
+    'fidelity = "frame"'
 }
 """Fidelities that there were, with what to do."""
 

@@ -1,5 +1,7 @@
 """Errors of numerical settings against a reference, their cost, and which are worth it."""
 
+import re
+import textwrap
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -12,7 +14,7 @@ from ringsim.analysis.engines import GROUPS, OUTPUTS, Errors
 from ringsim.analysis.ladder import FRAME, PATHS, STANDING, Rung
 from ringsim.outputs import VARIABLES
 from ringsim.stepping.instant import Array
-from ringsim.tables import markdown_table
+from ringsim.tables import Table, markdown_table
 from ringsim.variables import Status
 
 # A single error may be small by chance: errors of coarse steps and of few elements have signs and
@@ -64,7 +66,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     Raises
     ------
     ValueError
-        If too few runs for a reference ended well.
+        If too few runs were completed for a reference.
     """
     alone = all(rung.fidelity != "full" for rung in rungs)
     errors = Errors(results, rungs, FRAME if alone else "full")
@@ -92,20 +94,20 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     rows: list[tuple[str, tuple[str, ...], Any, str, str]] = [
         ("error", both, error, "error relative to the reference", "1"),
         ("bound", both, good,
-         "largest error of this and all finer settings and the reference", "1"),
+         "largest error of this and all finer settings, plus the reference's uncertainty", "1"),
         ("order", ("graded", "output"), orders, "observed order", "1"),
-        ("uncertainty", ("output",), own, "uncertainty of the reference, relative", "1"),
-        ("reference", ("output",), best, "extrapolated reference, SI units and degrees", ""),
+        ("uncertainty", ("output",), own, "relative uncertainty of the reference", "1"),
+        ("reference", ("output",), best, "extrapolated value (SI units and degrees)", ""),
         ("frontier", both, frontier(cost, ranked),
          "whether no setting is both cheaper and better", ""),
         ("cheapest", ("target", "output"), pick,
-         "the cheapest rung within the target, -1 if there is none", ""),
-        ("cost", one, cost, "processor time, as fitted", "s"),
+         "the cheapest setting within the target, -1 if there is none", ""),
+        ("cost", one, cost, "processor time, from the fit", "s"),
         ("residual_evaluations", one, residuals,
-         "residuals that Newton evaluated in accepted steps", "1"),
-        ("eligible", one, choice, "whether it may be recommended", ""),
+         "residual evaluations of Newton's method in accepted steps", "1"),
+        ("eligible", one, choice, "whether this setting may be recommended", ""),
         ("status", one, results.status.to_numpy(), "how the run ended", ""),
-        ("ladder", one, ladders, "what is varied", ""),
+        ("ladder", one, ladders, "what the settings vary", ""),
         ("label", one, [rung.label for rung in rungs], "the setting", ""),
         ("fidelity", one, [rung.fidelity for rung in rungs], "the engine", ""),
         *((v.name, one, counts[v.name], v.long_name, v.units)
@@ -114,9 +116,9 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     if engines is not None:
         rows += [
             ("engines_differ", ("output",), engines.apart,
-             "distance of the limits of both engines, relative", "1"),
+             "relative difference of the limits of both engines", "1"),
             ("frame_uncertainty", ("output",), engines.uncertainty,
-             "uncertainty of the frame engine's limit, relative", "1"),
+             "relative uncertainty of the frame engine's limit", "1"),
         ]  # fmt: skip
     if "reason" in results:
         rows.append(("reason", one, results.reason.to_numpy().astype(str), "why", ""))
@@ -126,7 +128,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         rows.append((path.replace(".", "_"), one, values, f"setting {path}", units))
     if truths:
         apart = np.array([_distances(errors, truth) for truth in truths])
-        text, of_rungs = "distance from values of other origin, relative", apart[:, :-1]
+        text, of_rungs = "relative difference from independent values", apart[:, :-1]
         rows += [
             ("from_truth", ("rung", "truth"), np.where(errors.good, of_rungs, np.nan).T, text, "1"),
             ("reference_from_truth", ("truth",), apart[:, -1], f"reference: {text}", "1"),
@@ -243,49 +245,75 @@ def in_favour(cost: Array, ladders: Sequence[str]) -> Array:
     return cost * np.where(np.array(ladders) == STANDING, WORTH_A_CHANGE, 1.0)
 
 
-# The tables of an accuracy study, in Markdown.
+# The tables of an accuracy study, in Markdown and for terminals.
 
 
 _NAMES = OUTPUTS | {group: f"all {group}" for group in GROUPS}
+_BOLD = re.compile(r"\*\*(.*?)\*\*")
+_WIDTH = 100
+"""Of texts in a terminal."""
 _THEORY = 2
 """Order of the integrator, and of the elements."""
 _ADVICE = (
-    "The cheapest setting that is good for an error. What a setting is good for is the largest "
-    "error among itself and all finer settings, plus the reference's uncertainty: a single error "
-    "may be small by chance. Errors are relative; for series (opening angle, asynchrony) the "
-    "largest difference over the whole run counts. Another setting is named only if it is cheaper "
-    "than the scene's own by a tenth."
+    "The cheapest setting for each error. The error of a setting is the largest one among this "
+    "and all finer settings, plus the uncertainty of the reference: a single error may be small "
+    "by chance. Errors are relative; for time series (opening angle, asynchrony) the largest "
+    "difference over the run counts. A setting other than the scene's own is named only if it is "
+    "at least a tenth cheaper."
 )
 _COSTS = (
-    "Errors, bold where no other setting is both cheaper and good for less; a run that two ladders "
-    "share is listed in the first. The cost is processor time, fitted to residuals, Jacobians and "
-    "steps over all runs, so that the scatter of single timings cancels:"
+    "Errors of all settings, marked (bold or *) where no other setting is both cheaper and more "
+    "accurate. The cost is processor time from a fit over all runs (to residuals, Jacobians and "
+    "steps), so that scatter of single timings averages out:"
 )
 _ORDERS = (
-    "Observed orders: for steps the slope of their error (against the limit of fine steps with as "
-    "many elements) over the step, among all steps no longer than the scene's own whose error is "
-    "clearly above the uncertainty of that limit; for elements that of the changes from one number "
-    "of elements to the next, with fine steps. A dash where errors or changes are too small to "
-    "tell, or hardly change:"
+    "Observed orders: for steps the slope of their error (against the limit of fine steps with "
+    "as many elements) over the step, among all steps no longer than the scene's own whose error "
+    "is clearly above the uncertainty of that limit; for elements that of the changes from one "
+    "number of elements to the next, with fine steps. A dash: errors or changes are too small, "
+    "or hardly change:"
 )
 _ENGINES = (
     "How far the engines differ: the distance of the limits of their finest runs, relative, and "
-    "how uncertain either limit is (that of the full engine is the reference of all errors). What "
-    "is larger than both uncertainties together, bold, is a difference of the engines themselves:"
+    "how uncertain either limit is (that of the full engine is the reference of all errors). A "
+    "difference larger than both uncertainties together, marked (bold or *), is one of the engines "
+    "themselves:"
 )
 _TRUTHS = (
-    "Distance from values that do not come from this model (they hold for rigid rods; the rest is "
-    "the effect of the rods' elasticity):"
+    "Difference from values that do not come from this model (they are for rigid rods; part of "
+    "the difference is the rods' elasticity):"
 )
 
 
 def tables(found: xr.Dataset, title: str) -> str:
-    """Recommendation, errors and cost, orders, and distance from independent values.
+    """Recommendation, errors and cost, orders, and distance from independent values in Markdown.
 
     ``found`` is from :func:`ringsim.analysis.accuracy.judge`; ``title`` is the heading.
     """
+    texts = (
+        markdown_table(each.head, each.rows) if isinstance(each, Table) else each
+        for each in _parts(found)
+    )
+    return "\n\n".join([f"# {title}", *texts]) + "\n"
+
+
+def lines(found: xr.Dataset, title: str) -> list[str]:
+    """The same for a terminal: what is bold there has a star."""
+    told = [title]
+    for each in _parts(found):
+        told.append("")
+        if isinstance(each, Table):
+            rows = [[_BOLD.sub(r"\1 *", str(cell)) for cell in row] for row in each.rows]
+            told += Table(each.head, rows).lines()
+        else:
+            told += textwrap.wrap(each, _WIDTH) if "\n" not in each else each.splitlines()
+    return [line.replace("`", "") for line in told]
+
+
+def _parts(found: xr.Dataset) -> list[str | Table]:
+    """Texts and tables in their order."""
     single = found.drop_sel(output=list(GROUPS), errors="ignore")
-    parts = [f"# {title}", *filter(None, [found.attrs.get("remarks")])]
+    parts: list[str | Table] = [*filter(None, [found.attrs.get("remarks")])]
     parts += [_ADVICE, _advice(found), _COSTS, _errors(single)]
     parts += [_ORDERS, _orders(single)]
     if "engines_differ" in found:
@@ -294,9 +322,9 @@ def tables(found: xr.Dataset, title: str) -> str:
         parts += [_TRUTHS, _truths(found)]
     failed = [k for k in _distinct(found) if found.status.values[k] != Status.OK]
     if failed and "reason" in found:
-        lines = [f"- {_name(found, k)}: {_end(found, k)}: {found.reason.values[k]}" for k in failed]
-        parts += ["Settings that did not end well:", "\n".join(lines)]
-    return "\n\n".join(parts) + "\n"
+        ends = [f"- {_name(found, k)}: {_end(found, k)}: {found.reason.values[k]}" for k in failed]
+        parts += ["Settings whose runs failed:", "\n".join(ends)]
+    return parts
 
 
 def in_words(found: xr.Dataset, rung: int) -> str:
@@ -308,7 +336,7 @@ def in_words(found: xr.Dataset, rung: int) -> str:
     return " ".join(words) or STANDING
 
 
-def _advice(found: xr.Dataset) -> str:
+def _advice(found: xr.Dataset) -> Table:
     targets, rows = found.target.values.tolist(), []
     for name, column in zip(_names(found), found.output, strict=True):
         of = found.sel(output=column)
@@ -317,10 +345,10 @@ def _advice(found: xr.Dataset) -> str:
             otherwise = "reference too coarse" if of.uncertainty >= target else "none tried"
             words = f"{in_words(of, cheapest)}, {of.cost.values[cheapest]:.3g} s"
             rows[-1].append(words if cheapest >= 0 else otherwise)
-    return markdown_table(["error of", *(f"{target:g}" for target in targets)], rows)
+    return Table(["error of", *(f"{target:g}" for target in targets)], rows)
 
 
-def _errors(found: xr.Dataset) -> str:
+def _errors(found: xr.Dataset) -> Table:
     """Errors and cost of every setting; what lies on a frontier is bold."""
     rows = []
     for rung in _distinct(found):
@@ -335,18 +363,18 @@ def _errors(found: xr.Dataset) -> str:
     last = ["" if name == "energy" else f"{e:.1e}" for name, e in own]
     rows.append(["uncertainty of the reference", *[""] * 5, *last])
     head = ["setting", "steps", "residuals", "Jacobians", "run", "cost"]
-    return markdown_table(head + _names(found), rows)
+    return Table(head + _names(found), rows)
 
 
-def _orders(found: xr.Dataset) -> str:
+def _orders(found: xr.Dataset) -> Table:
     rows = [
-        [name, _THEORY, *(f"{o:.1f}" if np.isfinite(o) else "-" for o in orders)]
+        [name, str(_THEORY), *(f"{o:.1f}" if np.isfinite(o) else "-" for o in orders)]
         for name, orders in zip(found.graded.values.tolist(), found.order.values, strict=True)
     ]
-    return markdown_table(["ladder", "theory", *_names(found)], rows)
+    return Table(["ladder", "theory", *_names(found)], rows)
 
 
-def _engines_text(found: xr.Dataset) -> str:
+def _engines_text(found: xr.Dataset) -> Table:
     apart, full, frame = (
         found[name].values for name in ("engines_differ", "uncertainty", "frame_uncertainty")
     )
@@ -356,16 +384,16 @@ def _engines_text(found: xr.Dataset) -> str:
         if np.isfinite(d)
     ]
     head = ["output", "engines differ by", "uncertainty, full", "uncertainty, frame"]
-    return markdown_table(head, rows)
+    return Table(head, rows)
 
 
-def _truths(found: xr.Dataset) -> str:
+def _truths(found: xr.Dataset) -> Table:
     rows = []
     for of in (found.sel(truth=name) for name in found.truth):
         output, _, source = of.truth.item().partition(": ")
         gaps = (of.reference_from_truth.item(), of.from_truth.values[_standing(found)])
         rows.append([f"{_NAMES.get(output, output)}, {source}", *(f"{gap:.1e}" for gap in gaps)])
-    return markdown_table(["value", "reference", STANDING], rows)
+    return Table(["value", "reference", STANDING], rows)
 
 
 def _names(found: xr.Dataset) -> list[str]:

@@ -82,7 +82,7 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
             found.setdefault(kind, []).append((sample, remark))
     every = int(held.sum())
     return [
-        f"{_where(len(own), every)}, as sample {own[0][0]} tells: {own[0][1]}"
+        f"{_where(len(own), every)}, for example in sample {own[0][0]}: {own[0][1]}"
         for own in sorted(found.values(), key=len, reverse=True)
     ]
 
@@ -150,8 +150,8 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 lines.append(f"{variable.summary[0]} in sample {sample}: {said}{error}{mark}")
     if unknown:
         lines.append(
-            "no sample states its numerical error: give error_bars_every, or see what "
-            "solver.error_bars = true says of the samples named here"
+            "no sample has numerical error bars: set error_bars_every in the campaign file, or "
+            "solver.error_bars = true for the scenes of the samples named here"
         )
     return lines
 
@@ -167,6 +167,6 @@ def _of_others(sound: xr.Dataset, variable: Variable) -> tuple[float, str]:
     largest = float(stated.max())
     most = with_unit(f"{largest:.2g}", units)
     return largest, (
-        f"; it states no numerical error, the {counted(stated.size, 'sample')} that do have {most} "
-        "at most"
+        f"; this sample has no error bar, the {counted(stated.size, 'sample')} that have one are "
+        f"within {most}"
     )

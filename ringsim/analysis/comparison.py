@@ -194,7 +194,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
     Returns for every output NAME that both have ``NAME_mean`` (side), ``NAME_difference``,
     ``NAME_difference_interval`` (bound), ``NAME_samples`` (side) in its unit, and for pairs
     ``NAME_largest_difference`` with ``NAME_largest_difference_sample``; the pairs whose outcome
-    differs along ``change``; shares of outcomes along ``kind`` and of samples that keep to a
+    differs along ``change``; shares of outcomes along ``kind`` and of samples that meet a
     requirement along ``requirement``, see ``differences_of_shares``; the scenes' values that differ
     along ``setting``, by path.  Samples are those that ``analyse`` counts; means and shares are
     those of populations, and of pairs of grids and lists.  ``pairing`` among the attributes says
@@ -286,10 +286,7 @@ def _numbered(dataset: xr.Dataset) -> xr.Dataset:
     """A campaign as it is; a run as a campaign of one sample."""
     for name in ("status", OUTCOME):
         if name not in dataset:
-            raise InputError(
-                f"it holds no {name}: give campaigns or runs that this version of ringsim has "
-                "written"
-            )
+            raise InputError(f"it has no {name}: give campaigns or runs of this version of ringsim")
     if "sample" in dataset.dims:
         return dataset
     scalars = dataset[[name for name, v in dataset.variables.items() if not v.dims]]
@@ -333,8 +330,9 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
     none = np.zeros(0, dtype=np.int64)
     return Pairs(
         none, none,
-        "samples are not paired, neither their seeds nor their inputs are equal: pairs would show "
-        "smaller differences; give both campaigns one seed, design and number of samples",
+        "samples are not paired, because neither their seeds nor their inputs are equal; pairs "
+        "show smaller differences: give both campaigns the same seed, design and number of "
+        "samples",
     )  # fmt: skip
 
 

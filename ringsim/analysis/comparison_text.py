@@ -78,12 +78,12 @@ def names_of(found: xr.Dataset) -> tuple[str, str]:
 def sections(found: xr.Dataset) -> dict[str, Section]:
     """All that a comparison tells, by name, parts without rows and notes left out."""
     parts = (
-        Section("settings", "What differs in what was asked", [_settings(found)]),
+        Section("settings", "Differences in the input", [_settings(found)]),
         Section("outcomes", "Outcomes", [
             _shares(found, "kind", "kind", "outcome"), _changed(found)
         ]),
         Section("requirements", "Requirements", [
-            _shares(found, "kept", "requirement", "samples that keep to")
+            _shares(found, "kept", "requirement", "samples that meet")
         ]),
         Section("outputs", "Numbers", [_outputs(found)]),
     )  # fmt: skip

@@ -144,33 +144,33 @@ class Placement:
         """What the intervals are from, or why there are none and how to get some."""
         if not self.kind:
             return (
-                "the file does not tell its design, so only extremes are given: analyse a campaign "
-                "that ringsim campaign has run, or set the attribute design"
+                "the design of this campaign is not known, so only the least and the largest "
+                "values are given: analyse a campaign that ringsim campaign has run, or set the "
+                "attribute design"
             )
         if not self.population:
             return (
-                f"a design of kind {self.kind} stands for no population, so there are only "
-                'extremes: draw samples with design = { kind = "random", samples = N } for means, '
-                "quantiles and probabilities"
+                f"samples of a {self.kind} design do not represent a population, so only the "
+                'least and the largest values are given: use design = { kind = "random", samples '
+                "= N } for means, quantiles and probabilities"
             )
         if self.independent:
             return (
-                "intervals of 95 %: bootstrap of means and standard deviations (with smaller "
-                "resamples where tails are long), order statistics of quantiles, Clopper-Pearson "
-                "of shares"
+                "95 % intervals: bootstrap for means and standard deviations, order statistics "
+                "for quantiles, Clopper-Pearson for shares"
             )
-        of = "the samples A and B of its blocks alone stand for the population: " * (self.block > 1)
+        of = "statistics use only the samples A and B of each block: " * (self.block > 1)
         if self.replicates > 1:
             return of + (
-                f"intervals of 95 % from {self.replicates} independent replicates of the design "
-                f"{self.kind}, with Student's t; shares of fewer than 10 samples have that of "
-                "independent samples"
+                f"95 % intervals from {self.replicates} independent replicates of the "
+                f"{self.kind} design (Student's t); for shares of fewer than 10 samples "
+                "Clopper-Pearson, as for independent samples"
             )
         return of + (
-            f"no intervals: the samples of one {self.kind} design depend on each other, so that "
-            "their scatter does not tell the error; give design.replicates = 8 (independent "
-            'replicates), or kind = "random"; bounds of requirements are those of independent '
-            "samples"
+            f"no intervals: samples of one {self.kind} design are not independent, so their "
+            "scatter does not show the error; set design.replicates = 8 (independent "
+            'replicates), or kind = "random"; bounds of requirements are calculated as for '
+            "independent samples"
         )
 
 
@@ -201,8 +201,10 @@ NUMERICAL = ("energy_error", "constraint_error")
 _EFFORT = ("wall_time",)
 
 
-LOST = "lost: "
+LOST = "failed: "
 """How the words begin for what became of a run whose numbers do not hold."""
+FAILED_RUNS = "failed runs"
+"""Name of all of these together."""
 UNKNOWN, NOT_RUN = "unknown", "not run"
 REACHED = tuple(fate.words for fate in GOALS)
 """What became of those that reached their goal."""
@@ -214,7 +216,7 @@ def endings(campaign: xr.Dataset) -> NDArray[np.str_]:
     >>> import xarray as xr
     >>> codes = {"status": ("sample", [0, 0, 7, -1]), "outcome": ("sample", [1, 3, 0, -1])}
     >>> endings(xr.Dataset(codes)).tolist()
-    ['deployed', 'stalled', 'lost: memory', 'not run']
+    ['deployed', 'stalled', 'failed: memory', 'not run']
     """
     status = campaign["status"].to_numpy()
     fates = campaign["outcome"].to_numpy() if "outcome" in campaign else np.zeros_like(status)
@@ -259,7 +261,7 @@ def told(campaign: xr.Dataset, counted: int) -> str:
     left = [f"{count} {word}" for word, count in Counter(words[~ok].tolist()).items()]
     if without := int(ok.sum()) - counted:
         left.append(f"{without} without a value")
-    lost = f"; left out: {', '.join(left)}" if left else "; none lost"
+    lost = f"; left out: {', '.join(left)}" if left else "; no run failed"
     return f"{counted} of {len(words)} samples{lost}"
 
 
@@ -509,9 +511,9 @@ def _require_codes(found: xr.Dataset, file: Path) -> None:
         if len(wrong):
             found.close()
             raise InputError(
-                f"{file}: {name} holds {wrong[0]:g}, which means nothing here (known: "
-                f"{', '.join(map(str, known))}): the file is damaged, or of another version of "
-                "ringsim: merge the campaign, or run the scene, again"
+                f"{file}: {name} holds {wrong[0]:g}, which is not a valid code (known: "
+                f"{', '.join(map(str, known))}): the file is damaged, or another version of "
+                "ringsim wrote it: merge the campaign, or run the scene, again"
             )
 
 
@@ -527,11 +529,11 @@ def open_stored(path: Path) -> xr.Dataset:
         file = path / MERGED
         if not file.exists():
             inside = (path / DESIGN).exists()
-            cure = "there is no campaign in it: give the folder that ringsim campaign named"
+            cure = "there is no campaign in it: give the folder that ringsim campaign has written"
             if inside and any(path.glob("journals/*")):
-                cure = f"its results are not merged yet: give ringsim merge {path} first"
+                cure = f"its results are not merged yet: run ringsim merge {path} first"
             elif inside:
-                cure = "no sample of it has run yet: give ringsim campaign the same file again"
+                cure = "no sample has run yet: run ringsim campaign with the same file again"
             raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
     import xarray as xr  # here, as in other files that runs load: it takes most of a second
 
@@ -540,8 +542,9 @@ def open_stored(path: Path) -> xr.Dataset:
         if (most := max(found.sizes.values(), default=0)) > _MOST_ENTRIES:
             found.close()
             raise InputError(
-                f"{file}: a dimension has {most:,} entries, must be at most {_MOST_ENTRIES:,}: the "
-                "file is damaged, or none of ringsim's: merge the campaign, or run the scene, again"
+                f"{file}: a dimension has {most:,} entries, must be at most {_MOST_ENTRIES:,}: "
+                "the file is damaged, or ringsim did not write it: merge the campaign, or run "
+                "the scene, again"
             )
         for variable in found.variables.values():
             if len(variable.dims) < 2:
@@ -549,15 +552,18 @@ def open_stored(path: Path) -> xr.Dataset:
     except FileNotFoundError:
         cure = "there is no such file or folder: check its name, and the folder that you are in"
         if file.name == MERGED and (file.parent / DESIGN).exists():
-            cure = f"not merged yet: give ringsim merge {file.parent} first, also while it runs"
+            cure = (
+                f"not merged yet: run ringsim merge {file.parent} first (this also works while "
+                "the campaign runs)"
+            )
         raise InputError(f"{file}: {cure}") from None
     except (InputError, UnicodeEncodeError):  # the latter of the file's name, see ringsim.cli
         raise
     except (OSError, ValueError) as error:
         if file.suffix == ".toml":
             raise InputError(
-                f"{file}: this says what to run, and holds no results: give the folder that "
-                "ringsim campaign named, runs/NAME by default"
+                f"{file}: this is an input file without results: give the folder that ringsim "
+                "campaign has written (runs/NAME by default)"
             ) from None
         reason = getattr(error, "strerror", None) or error
         raise InputError(

@@ -97,7 +97,7 @@ def check_lines(campaign: xr.Dataset) -> list[str]:
     found = differences(campaign)
     if found:
         both = counted(len(found[0].samples), "sample")
-        lines.append(f"median and worst are of the {both} that ended well with both engines")
+        lines.append(f"median and worst are over the {both} that both engines completed")
     rows = [
         (
             each.name, each.units, f"{np.median(each.apart):.2g}", f"{each.apart[each.worst]:.2g}",
@@ -151,7 +151,7 @@ def verdict(campaign: xr.Dataset, found: list[Difference]) -> list[str]:
         lines = [f"the engines differ by more than their error bars in {', '.join(beyond)}"]
     elif stated:
         told = [bool(np.isfinite(each.bars).any()) for each in found if each.listed]
-        of = f" in the {sum(told)} of {len(told)} outputs that have some" * (not all(told))
+        of = f" in the {sum(told)} of {len(told)} outputs that have error bars" * (not all(told))
         lines = [f"the engines differ by no more than their error bars{of}"]
     return lines + too_far(campaign, found)
 
@@ -163,7 +163,7 @@ def too_far(campaign: xr.Dataset, found: list[Difference] | None = None) -> list
         return []
     known = {each.name: each for each in (differences(campaign) if found is None else found)}
     if not known:
-        return ["max_difference cannot be judged: no sample ended well with both engines"]
+        return ["max_difference cannot be checked: no sample was completed by both engines"]
     over = [
         f"{name} ({share:.2g} of the value in sample {known[name].samples[k]}, max_difference = "
         f"{limits[name]:g})"

@@ -9,7 +9,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import indices
-from ringsim.analysis.design import Drawn, Placement, drawn, endings, short_of_goal, strongest
+from ringsim.analysis.design import (
+    FAILED_RUNS,
+    Drawn,
+    Placement,
+    drawn,
+    endings,
+    short_of_goal,
+    strongest,
+)
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
 from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used, varies
 from ringsim.analysis.requirements import Requirement, violations
@@ -93,9 +101,9 @@ def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
         return {}
     names = np.array(inputs.names, dtype=object)
     columns = {
-        "first": (names[[each.first for each in found]], {"long_name": "one input of the pair"}),
+        "first": (names[[each.first for each in found]], {"long_name": "first input of the pair"}),
         "second": (
-            names[[each.second for each in found]], {"long_name": "the other input of the pair"},
+            names[[each.second for each in found]], {"long_name": "second input of the pair"},
         ),
         "correlation": (
             [each.correlation for each in found], about("rank correlation of the two inputs"),
@@ -128,9 +136,10 @@ def confounding_notes(analysis: xr.Dataset, told: Collection[str]) -> list[str]:
     )
     more = f" and {counted(len(found) - _NAMED, 'other pair')}" * (len(found) > _NAMED)
     return [
-        "inputs are not independent in these samples, which chance does not explain (share of the "
-        f"variance of one that the other explains, rank correlation): {named}{more}; the effect of "
-        "one may be taken for the other's: draw more samples, or a design of kind random"
+        "these inputs are correlated in the samples, more than by chance (share of the variance "
+        f"of one that the other explains, rank correlation): {named}{more}, so that the effect "
+        "of one may be taken for that of the other: draw more samples, or use design.kind = "
+        '"random"'
     ]
 
 
@@ -192,27 +201,29 @@ def influence(
     if groups:
         pairs = [_separated(inputs, own, of, index, placed) for own, of in groups.values()]
         middle, ends = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
-        words = "probability that the input is larger in the group than in the rest"
+        words = (
+            "probability that the input is larger in a sample of the group than in another sample"
+        )
         found |= _told("separation", middle, ends, words, ("group", "input"))
         counts = np.array([own.sum() for own, _ in groups.values()], dtype="i8")
-        found["group_samples"] = "group", counts, about("samples of the group")
+        found["group_samples"] = "group", counts, about("number of samples in the group")
     if not found:
         return xr.Dataset()
     found["input_is_place"] = (
         "input", np.isin(inputs.level, ["place", "quarter"]),
-        about("whether it is of one place, or a quarter, of many"),
+        about("whether the input belongs to one section (pulley, ...) or to a quarter of them"),
     )  # fmt: skip
     found["inputs_held"] = (
         "input", _held(np.array(inputs.level)),
-        about("other inputs that its partial correlations hold"),
+        about("number of other inputs whose effect the partial correlation removes"),
     )  # fmt: skip
     found["input_of"] = (
         "input", np.array(inputs.input, dtype=object),
-        {"long_name": "input that it is a mean, a place or a word of"},
+        {"long_name": "drawn input that it belongs to"},
     )  # fmt: skip
     found["input_span"] = (
         ("input", "bound"), np.array(inputs.span, dtype="i8"),
-        about("first of its places, and the one behind the last"),
+        about("first of its sections (pulleys, ...), and the one after the last"),
     )  # fmt: skip
     found |= confounded(inputs, ok)
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
@@ -280,7 +291,7 @@ def _told(
 ) -> dict[str, Any]:
     return {
         name: (dims, middle, about(words)),
-        f"{name}_interval": ((*dims, "bound"), ends, about(f"interval of 95 % of: {words}")),
+        f"{name}_interval": ((*dims, "bound"), ends, about(f"95 % interval of: {words}")),
     }
 
 
@@ -334,7 +345,7 @@ def groups_of(
     What the same samples are has one name, parted by semicolons.
     """
     ok, gone = good(campaign), lost(campaign)
-    found = {"lost": (gone, ok | gone)}
+    found = {FAILED_RUNS: (gone, ok | gone)}
     words = endings(campaign)
     found |= {word: (words == word, ok) for word in short_of_goal(words)}
     for name, wanted in requirements.items():
@@ -384,7 +395,7 @@ def over_time(run: xr.Dataset) -> xr.Dataset:
     recorded.
     """
     if "opening_angle" not in run:
-        raise InputError("leader: needs opening_angle, which this dataset does not hold")
+        raise InputError("leader: needs opening_angle, which this dataset does not have")
     angles = run["opening_angle"].transpose("time", "plane", "section")
     rows = angles.to_numpy().reshape(angles.sizes["time"], -1)
     names = np.array(
@@ -393,14 +404,14 @@ def over_time(run: xr.Dataset) -> xr.Dataset:
     known = np.isfinite(rows).all(axis=1)
     filled = np.where(known[:, None], rows, 0.0)
     joints = {
-        "leader": (filled.argmax(axis=1), "V-joint that is most open"),
-        "laggard": (filled.argmin(axis=1), "V-joint that is least open"),
+        "leader": (filled.argmax(axis=1), "most open V-joint"),
+        "laggard": (filled.argmin(axis=1), "least open V-joint"),
     }
     found = xr.Dataset(coords={"time": run["time"]})
     for name, (joint, words) in joints.items():
         found[name] = "time", np.where(known, names[joint], ""), {"long_name": words}
     apart = np.where(known, np.ptp(filled, axis=1), np.nan)
-    says = about("how far they are apart", angles.attrs.get("units", ""))
+    says = about("difference of their opening angles", angles.attrs.get("units", ""))
     return found.assign(asynchrony=("time", apart, says))
 
 
@@ -413,8 +424,8 @@ def often(campaign: xr.Dataset) -> xr.Dataset:
     needed = [f"asynchrony_{who}_{dim}" for who in _WHO for dim in ("plane", "section")]
     if absent := [name for name in needed if name not in campaign]:
         raise InputError(
-            f"leader: needs {absent[0]}, which this campaign has left out, or which its fidelity "
-            "does not tell"
+            f"leader: needs {absent[0]}, which this campaign has not recorded, or which its "
+            "fidelity does not compute"
         )
     good = used(campaign)
     planes, sections = (campaign[dim].to_numpy().tolist() for dim in ("plane", "section"))

@@ -67,19 +67,22 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         if np.isnan(partial[0][chosen]).any():
             alike = [str(names[k]) for k in chosen if np.isnan(plain[0][k])]
             alone = np.nanmax(np.abs(plain[0][chosen])) > _ALONE
-            why = "one input decides its ranks" if alone else (
-                "they are too few, or inputs depend on each other"
+            why = "one input determines the ranks" if alone else (
+                "too few samples, or correlated inputs"
             )  # fmt: skip
-            why = f"{alike[0]} is the same in all samples used" if alike else why
-            lacking.append(f"{output} ({used} samples used: {why})")
+            why = f"{alike[0]} is the same in all these samples" if alike else why
+            lacking.append(f"{output} ({counted(used, 'sample')} used: {why})")
     if lacking:
-        notes.append(f"no partial correlation, which holds the other inputs: {', '.join(lacking)}")
+        notes.append(
+            "no partial correlation (effect of one input with the others removed): "
+            f"{', '.join(lacking)}"
+        )
     if rows:
         chance = (
-            f"about {(1 - LEVEL) * len(names):.2g} of their intervals leave out zero"
+            f"about {(1 - LEVEL) * len(names):.2g} of their intervals exclude zero"
             if certain else f"one in twenty reaches {1.96 / (least - 1) ** 0.5:.2g}"
         )  # fmt: skip
-        notes.append(f"the largest of {len(names)} inputs are listed; by chance alone {chance}")
+        notes.append(f"the strongest of {len(names)} inputs are listed; by chance alone {chance}")
         notes += confounding_notes(analysis, named)
     head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
     return marked(Table((*head, "used"), rows, notes), analysis)
@@ -93,7 +96,7 @@ def _separated(analysis: xr.Dataset) -> Table:
         one = analysis.sel(group=group)
         first, *others = str(group).split("; ")
         if others:
-            notes.append(f"{first}: the same samples as {', '.join(others)}")
+            notes.append(f"{first}: these are also the samples of {', '.join(others)}")
         middle, ends = one["separation"].values, one["separation_interval"].values
         rows += [
             (
@@ -106,7 +109,7 @@ def _separated(analysis: xr.Dataset) -> Table:
     return marked(Table(head, rows, notes), analysis)
 
 
-DIRECTED = ("compared with the others", "95 % interval")
+DIRECTED = ("compared with other samples", "95 % interval")
 """Heads of ``directed``."""
 
 
@@ -219,7 +222,7 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
             rows.append([*row, str(one["index_used"].item()), str(one["index_lost"].item())])
     notes = measure_notes(analysis)
     notes += confounding_notes(analysis, named) if dim == "input" else []
-    return marked(Table([*head, f"{of} used", "lost"], rows, notes), analysis)
+    return marked(Table([*head, f"{of} used", "left out"], rows, notes), analysis)
 
 
 def _gate(analysis: xr.Dataset) -> Iterator[str]:
@@ -227,7 +230,7 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
     if "missing_by_inputs" not in analysis:
         return
     outputs: dict[tuple[int, int, float], list[str]] = {}
-    blocks = ", and the rest of their blocks," if "factor" in analysis.dims else ""
+    blocks = ", with the rest of their blocks," if "factor" in analysis.dims else ""
     for output in analysis["output"].values.tolist():
         one = analysis.sel(output=output)
         if count := one["missing"].item():
@@ -238,18 +241,21 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
         who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
         p = chance_text(chance)
         if chance < UNLIKELY:
-            cures = ["require or analyse the outcome instead"] * (failed < count)
+            cures = ["set a requirement on the outcome instead"] * (failed < count)
             if failed:  # what did not fail has no value because of what the antenna did
-                cures.append(f"mend the {failed} that failed (ringsim campaign --retry-failed)")
+                cures.append(
+                    f"run the {failed} failed ones again (ringsim campaign --retry-failed)"
+                )
             yield (
-                f"no index of {who}: {counted(count, 'sample')} without a value, and inputs decide "
-                f"which ({p}), so that the others do not stand for all: see what separates them, "
-                f"{', '.join(cures)}, or narrow the inputs"
+                f"no sensitivity index for {who}: whether a sample has a value depends on the "
+                f"inputs ({counted(count, 'sample')} without, {p}), so the rest is not "
+                f"representative: see what separates them, {', '.join(cures)}, or narrow the "
+                "inputs"
             )
         else:
             yield (
-                f"{who}: {counted(count, 'sample')} without a value{blocks} left out: no input "
-                f"seems to decide which ({p})"
+                f"{who}: {counted(count, 'sample')} without a value{blocks} left out; this does "
+                f"not seem to depend on any input ({p})"
             )
 
 
@@ -267,17 +273,18 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
     """What the measure of the design means, or lacks."""
     if "mean_absolute_effect" in analysis:
         return [
-            "mu*: mean absolute change of the output, in its unit, when the group moves by half of "
-            "its levels; sigma: scatter of that change"
+            "mu*: mean absolute change of the output, in its unit, when the inputs of a group "
+            "move by half of their range; sigma: standard deviation of that change"
         ]
     if "total_index" in analysis:
         none = analysis["total_index_interval"].isnull().all()
-        cure = "no intervals: give design.replicates = 8, or more, for independent replicates"
+        cure = "no intervals: set design.replicates = 8 or more (independent replicates)"
         return [cure] * bool(none) + _unsure(analysis)
     if "given_data_index" in analysis:
         return [
-            "shares of the variance by one input alone, from bins: corrected for chance, too small "
-            "where the output bends within a bin"
+            "first-order index: share of the variance that one input alone explains, estimated "
+            "from bins of its values and corrected for chance; too small if the output is "
+            "strongly nonlinear within a bin"
         ]
     return []
 
@@ -296,17 +303,17 @@ def _unsure(analysis: xr.Dataset) -> list[str]:
     )
     both, wide = np.stack([first, total]), np.stack([np.ptp(each, axis=-1) for each in ends])
     signs = {
-        f"indices outside of 0 .. 1 ({number_text(_farthest(both), 2)})": (
+        f"indices outside 0 .. 1 ({number_text(_farthest(both), 2)})": (
             (both < _LEAST) | (both > 1.0 + _SLACK)
         ).any(axis=(0, 2)),
-        "first-order indices above total ones": (low > high).any(axis=1),
+        "first-order indices above total indices": (low > high).any(axis=1),
         f"intervals longer than {_WIDE}": (wide > _WIDE).any(axis=(0, 2)),
     }  # fmt: skip
     outputs = analysis["output"].values
     found = [f"{sign} of {', '.join(outputs[own])}" for sign, own in signs.items() if own.any()]
     if not found:
         return []
-    return [f"too few base samples: {'; '.join(found)}: give more of them (design.samples)"]
+    return [f"too few base samples: {'; '.join(found)}: increase design.samples"]
 
 
 def _farthest(values: Array) -> float:
@@ -369,24 +376,24 @@ def what_matters(analysis: xr.Dataset) -> Table:
             quiet.append(output)
     notes = measure_notes(analysis)
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
-        count = analysis.sizes["input"]
-        whose = f"one of {count} inputs (places and means count)" if count > 1 else "the input"
+        count = counted(analysis.sizes["input"], "input")
         twice = measure in _CHANCE and bool(_correlated(analysis))
         how = " by its index or its partial rank correlation" * twice
         notes.append(
-            f"chance alone would list {whose}{how} in fewer than one output of "
-            f"{10 if twice else 20}; of a mean and its parts only the strongest is listed"
+            f"by chance alone, fewer than one output in {10 if twice else 20} would have an input "
+            f"listed{how} ({count} in all, sections and means included); of a mean and its parts "
+            "only the strongest is listed"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if more:
-        notes.append(f"further inputs beyond chance, told with --full: {', '.join(more)}")
+        notes.append(f"further significant inputs, listed with --full: {', '.join(more)}")
     if doubtful:
         notes.append(
-            "not listed, as another input of larger index goes with it and explains it (with that "
-            f"one held, its rank correlation is within chance): {', '.join(doubtful)}"
+            "not listed, because a correlated input with a larger index explains it (its partial "
+            f"rank correlation is not significant): {', '.join(doubtful)}"
         )
     if quiet:
-        notes.append(f"no input matters more than chance would explain for {', '.join(quiet)}")
+        notes.append(f"no significant input for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
     return marked(Table(head, rows, notes, left=2), analysis, 1)

@@ -207,7 +207,7 @@ def references(
     threes = [in_time[k : k + _LEVELS] for k in range(len(in_time) - _LEVELS + 1)]
     halved = [t for t in threes if rungs[t[0]].size == 2.0 ** (_LEVELS - 1) * rungs[t[-1]].size]
     if not halved or in_space[:1] != own["elements"][:1] or len(in_space) < 2:
-        raise ValueError("too few runs for a reference ended well")
+        raise ValueError("too few runs were completed for a reference")
     return halved[-1], in_space
 
 

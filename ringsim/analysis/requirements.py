@@ -16,7 +16,7 @@ from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.stepping.instant import Array
-from ringsim.tables import unit_text, with_unit
+from ringsim.tables import counted, unit_text, with_unit
 from ringsim.units import Model
 from ringsim.variables import Fate
 
@@ -60,8 +60,8 @@ class Requirement(Model):
     probability: Annotated[float, Field(gt=0.0, lt=1.0)]
     """Share of all antennas, at least, that must keep to it."""
     confidence: Annotated[float, Field(ge=0.5, lt=1.0)]
-    """Of either bound of the probability: so often, at least, samples of a design that falls short
-    of it are not judged as met."""
+    """Confidence of each one-sided bound of the probability: of a design that falls short of it at
+    most 1 - confidence of all campaigns find it met."""
 
     @property
     def given(self) -> list[tuple[Kind, Any]]:
@@ -95,7 +95,7 @@ def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
     known = [OUTCOME, *quantities()]
     for name, each in requirements.items():
         if name not in known:
-            why = f"is no output that can be required ({known_or_nearest(name, known)})"
+            why = f"is not an output that can have a requirement ({known_or_nearest(name, known)})"
             if name in VARIABLES and VARIABLES[name].dims:
                 senses = {"max": "largest", "min": "least"}
                 asked = [senses[key] for key, _ in each.limits if key in senses]
@@ -106,12 +106,13 @@ def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
                 wrong = f"is = {show(each.is_)}" if each.is_ is not None else "is"
                 hint = known_or_nearest(str(each.is_), _WORDS)
                 raise ValueError(
-                    f'{name}.{wrong} must be a word for what the antenna does, as is = "deployed", '
-                    f"without max and min ({hint})"
+                    f'{name}.{wrong} must be an outcome, for example is = "deployed", without '
+                    f"max and min ({hint})"
                 )
         elif each.is_ is not None:
             raise ValueError(
-                f"{name}.is = {show(each.is_)}: only the outcome is a word: give max or min"
+                f"{name}.is = {show(each.is_)}: only the requirement on outcome takes is; use "
+                "max or min"
             )
         elif not each.given:
             unit = unit_text(quantities()[name].units)
@@ -220,7 +221,7 @@ def require_values(campaign: xr.Dataset, name: str) -> None:
     none = np.flatnonzero(good(campaign) & ~tells_of(campaign, name))
     if name != OUTCOME and len(none):
         raise InputError(
-            f"requirement on {name}: {len(none)} samples reached their goal without a value of "
-            f"it, the first is {campaign['sample'].to_numpy()[none[0]]}: their model does not "
-            "compute it; require another output, or use the full fidelity"
+            f"requirement on {name}: {counted(len(none), 'sample')} reached the goal without a "
+            f"value of it, first sample {campaign['sample'].to_numpy()[none[0]]}: this fidelity "
+            'does not compute it; set the requirement on another output, or use fidelity = "full"'
         )

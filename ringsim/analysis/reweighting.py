@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from ringsim.analysis.design import (
+    FAILED_RUNS,
     LOST,
     Placement,
     called,
@@ -338,7 +339,7 @@ def weights_of(
             # Of paths that share one drawn value none has a distribution of its own.
             whole = (f"did you mean {n}?" for n, each in known.items() if path in paths_of(each))
             hint = next(whole, hint)
-            raise InputError(f"--reweight {path}: is no drawn input of this campaign ({hint})")
+            raise InputError(f"--reweight {path}: is not a drawn input of this campaign ({hint})")
         values, old = known[path].to_numpy(), _drawn_from(campaign, path, known[path])
         _check_cover(path, old, new, len(values))
         ratio = new.log_density(values) - old.log_density(values)
@@ -353,16 +354,16 @@ def _drawn_from(campaign: xr.Dataset, path: str, variable: xr.DataArray) -> Dist
         old = _Holder.model_validate({"reweight": {path: table}}).reweight[path]
     except (ValueError, ValidationError):
         raise InputError(
-            f"--reweight {path}: the file tells no distribution of it, as of values that were "
-            "listed: draw it from one"
+            f"--reweight {path}: this input has no distribution in the file (its values were "
+            "listed): draw it from a distribution"
         ) from None
     text = parse_toml(str(campaign.attrs.get("campaign", "")), "campaign")
     for pair in text.get("correlations", []):
         if path in (names := pair.get("between", [])):
             raise InputError(
-                f"--reweight {path}: it was drawn with a correlation to "
-                f"{next((name for name in names if name != path), path)}, which another "
-                "distribution of one alone does not keep: run a campaign with it"
+                f"--reweight {path}: it is correlated with "
+                f"{next((name for name in names if name != path), path)}, and a new distribution "
+                "of one input alone would not keep the correlation: run a new campaign"
             )
     return old
 
@@ -372,30 +373,30 @@ def _check_cover(path: str, old: Distribution, new: Distribution, samples: int) 
         kinds = ["values" if isinstance(each, Discrete) else "an interval" for each in (old, new)]
         raise InputError(
             f"--reweight {path}: it was drawn from {kinds[0]}, and the new distribution is over "
-            f"{kinds[1]}: samples of the one do not cover the other"
+            f"{kinds[1]}: run a new campaign"
         )
     if isinstance(new, Discrete):
         for value in new.values:
             if not np.isfinite(old.log_density(np.array([value], dtype=object))).all():
                 raise InputError(
-                    f"--reweight {path}: {show(value)} was never drawn, so no sample tells about "
-                    "it: leave it out, or run a campaign with it"
+                    f"--reweight {path}: {show(value)} was never drawn, so no sample has it: "
+                    "leave it out, or run a campaign with it"
                 )
         return
     # All but what is discrete has cumulative probabilities.
     cumulative: Any = new
     tail = 0.5 / samples
     for part, most, words in (
-        (0.0, _BEYOND, "where it was not drawn at all"),
-        (tail, max(_BEYOND_SAMPLES, 2 / samples), f"where {samples} samples hardly reach"),
+        (0.0, _BEYOND, "where no value was drawn"),
+        (tail, max(_BEYOND_SAMPLES, 2 / samples), f"where hardly any of {samples} samples lie"),
     ):
         low, high = old.quantile(inside(np.array([part, 1 - part]))).tolist()
         beyond = cumulative.probability(low) + 1 - cumulative.probability(high)
         if beyond > most:
             raise InputError(
-                f"--reweight {path}: {beyond:.2g} of the new distribution lies below {low:.4g} or "
-                f"above {high:.4g}, {words}, must be at most {most:.2g}: choose a narrower one, or "
-                "run a campaign with it"
+                f"--reweight {path}: {beyond:.2g} of the new distribution lies below {low:.4g} "
+                f"or above {high:.4g}, {words}; at most {most:.2g} is allowed: choose a narrower "
+                "distribution, or run a campaign with it"
             )
 
 
@@ -418,9 +419,9 @@ def reweight(
     run = ok | gone
     if (count := effective(weights[run])) < LEAST_EFFECTIVE:
         raise InputError(
-            f"--reweight {', '.join(wanted)}: {run.sum()} samples count as {count:.2g} effective "
-            f"ones, must be at least {LEAST_EFFECTIVE:g}: choose a distribution nearer to the old "
-            "one, reweight fewer inputs, or run a campaign with it"
+            f"--reweight {', '.join(wanted)}: {run.sum()} samples are worth {count:.2g} "
+            f"effective ones, and at least {LEAST_EFFECTIVE:g} are needed: choose a distribution "
+            "closer to the old one, reweight fewer inputs, or run a campaign with it"
         )
     found: dict[str, Any] = {}
     for name, variable in quantities().items():
@@ -439,7 +440,7 @@ def reweight(
         )  # fmt: skip
         found[f"{name}_decisive_samples"] = (
             "reweighted_statistic", rows[:, 3],
-            about("effective samples that decide each estimate"),
+            about("effective samples that determine each estimate"),
         )  # fmt: skip
         found[f"{name}_effective_samples"] = (
             (), effective(weights[known]), about("effective samples"),
@@ -457,11 +458,12 @@ def reweight(
         words.append(word)
         shares.append((share, *ends, decisive))
     told = np.array(shares).reshape(-1, 4)
-    says = about("share if inputs had the other distributions")
+    says = about("share with the new distributions of the inputs")
     found["reweighted_share"] = "event", told[:, 0], says
     found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:3], says
     found["reweighted_share_decisive"] = (
-        "event", told[:, 3], about("effective samples of the event, or of the others if fewer"),
+        "event", told[:, 3], about(
+            "effective samples in the event, or outside of it if these are fewer"),
     )  # fmt: skip
     if requirements and ok.any():
         found |= _verdicts(campaign, requirements, placed, weights, pairs)
@@ -513,11 +515,11 @@ def _verdicts(
         verdict = verdict_of(*ends, wanted.probability)
         rows.append((verdict, mean((~broken[held]).astype(float), weights[held]), *ends))
     told = np.array(rows)
-    words = "probability to keep to it if inputs had the other distributions"
+    words = "probability of meeting the requirement with the new distributions of the inputs"
     return {
         "reweighted_verdict": (
             "requirement", told[:, 0].astype("i1"),
-            about("verdict if inputs had the other distributions") | flags_of(Verdict),
+            about("verdict with the new distributions of the inputs") | flags_of(Verdict),
         ),
         "reweighted_probability": ("requirement", told[:, 1], about(words)),
         "reweighted_bounds": (
@@ -565,7 +567,7 @@ def _events(
         kinds = [word for word in kinds_of_ends(words) if not word.startswith(LOST)]
         found = {word: (words == word, ok) for word in kinds}
     if gone.any():
-        found["lost"] = gone, ok | gone
+        found[FAILED_RUNS] = gone, ok | gone
     for name, each in requirements.items() if ok.any() else ():
         found[each.told(name)] = ok & ~violations(campaign, name, each), ok
     return found

@@ -31,14 +31,18 @@ _LEAST_FOR_FIRST = 100
 Found = dict[str, tuple[tuple[str, ...], Array]]
 """Values of variables, and their intervals ("..._interval"), with their dimensions."""
 ABOUT = {
-    "first_order_index": "share of the variance by the group alone (Sobol' index)",
-    "total_index": "share of the variance with the group in any interaction (total index)",
-    "second_order_index": "share of the variance by the interaction of two groups",
-    "mean_absolute_effect": "mean absolute change of the output by a move of the group (mu*)",
-    "mean_effect": "mean change of the output by a move upwards (mu)",
-    "effect_deviation": "standard deviation of the change by a move upwards (sigma)",
-    "given_data_index": "share of the variance by the input alone, from plain samples",
-    "chance_level": "largest index of all inputs that one in 20 outputs of chance would reach",
+    "first_order_index":
+        "share of the variance that the group alone explains (first-order Sobol' index)",
+    "total_index":
+        "share of the variance that the group explains with all its interactions (total index)",
+    "second_order_index": "share of the variance that the interaction of two groups explains",
+    "mean_absolute_effect": "mean absolute change of the output when the group moves (mu*)",
+    "mean_effect": "mean change of the output when the group moves upwards (mu)",
+    "effect_deviation": "standard deviation of the change when the group moves upwards (sigma)",
+    "given_data_index":
+        "share of the variance that the input alone explains, from independent samples",
+    "chance_level":
+        "largest index of all inputs that chance alone would reach for one output in 20",
 }  # fmt: skip
 
 
@@ -125,13 +129,13 @@ def sensitivity(
     made = _dataset(outputs, found, coords, block is not None)
     of = "samples" if block is None else "blocks"
     for k, (name, words) in enumerate({
-        "index_used": f"{of} that indices are from",
-        "index_lost": f"{of} that are left out, because a sample of them has no value",
-        "missing": f"samples of {count} that have run without a value",
+        "index_used": f"{of} used for the indices",
+        "index_lost": f"{of} left out because a sample has no value",
+        "missing": f"samples of {count} completed ones without a value",
         "missing_lost": "of these, samples whose run failed",
     }.items()):  # fmt: skip
         made[name] = "output", counts[:, k], about(words)
-    words = "probability that samples missing at random go with inputs as much"
+    words = "probability that samples missing at random would depend as much on the inputs"
     made["missing_by_inputs"] = "output", chance, about(words)
     return made
 
@@ -193,7 +197,7 @@ def _dataset(
         | {name: np.array(each, dtype=object) for name, each in coords.items()}
     )
     made["output_units"] = "output", np.array([u for _, u in outputs.values()], dtype=object)
-    made["output_units"].attrs = {"long_name": "unit of the output, also of effects"}
+    made["output_units"].attrs = {"long_name": "unit of the output and of the effects"}
     first: Found = next(iter(found.values()), {})
     for name, (dims, shape) in first.items():
         values = np.full((len(outputs), *shape.shape), np.nan)
@@ -204,7 +208,7 @@ def _dataset(
         made[name].attrs = {"long_name": ABOUT[name]}
         if values.shape[-1] > 1:
             made[f"{name}_interval"] = ("output", *dims, "bound"), values[..., 1:]
-            made[f"{name}_interval"].attrs = {"long_name": f"interval of 95 % of: {ABOUT[name]}"}
+            made[f"{name}_interval"].attrs = {"long_name": f"95 % interval of: {ABOUT[name]}"}
     if "second_order_index" in made and in_blocks:
         made = made.assign_coords(other_factor=np.array(coords["factor"], dtype=object))
     return made

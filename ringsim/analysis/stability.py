@@ -39,7 +39,7 @@ def compared(whole: xr.Dataset) -> xr.Dataset:
     words = np.full(whole.sizes["cell"], "", dtype=object)
     for full, frame in pairs:
         words[full] = words[frame] = _apart(whole.isel(cell=full), whole.isel(cell=frame))
-    about = {"long_name": "in what this cell differs from that of the other engine"}
+    about = {"long_name": "difference from the same cell of the other engine"}
     return whole.assign({ENGINES: ("cell", words, about)})
 
 
@@ -85,8 +85,9 @@ def engines_text(whole: xr.Dataset) -> list[str]:
                 ends = (_told(cells.isel(cell=k), word) for cells in (one, two))
                 rows.append([title, place, word.replace("_", " "), *ends])
     text = (
-        f"Both engines ran {count} cells. In {len(rows)} of them they differ: in how the run "
-        f"ended, or in a value by more than both error bars together, which {barred} cells have."
+        f"Both engines ran {counted(count, 'cell')}. In {len(rows)} of them they differ: in how "
+        f"the run ended, or in a value by more than both error bars together, which {barred} "
+        "cells have."
     )
     head = ["panel", "x, y", "differs in", "full", "frame"]
     table = [markdown_table(head, rows)] if rows else []
@@ -134,13 +135,13 @@ _MEANING = {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in
     "y": ("1", "value on the second axis, in the units of the cell's panel"),
     "of_group": ("1", "number of the cell's panel"),
     "reason": ("", "why the run ended so"),
-    "cause": ("", "the reason in a word"),
+    "cause": ("", "the cause in a word"),
     "verdict": ("", "ok, ended with a cause, or wrong"),
-    "check": ("", "whether a finer run agreed to within what ok stands for"),
+    "check": ("", "whether a run with finer steps agreed within the tolerance of ok"),
     "final_angle": ("degree", "mean opening angle at the last output time"),
-    "time_difference": ("1", "change of the deployment time in a finer run, over itself"),
-    "angle_difference": ("degree", "change of the mean opening angle in a finer run"),
-    "tension_difference": ("1", "change of the largest tension in a finer run, over itself"),
+    "time_difference": ("1", "relative change of the deployment time in a run with finer steps"),
+    "angle_difference": ("degree", "change of the mean opening angle in a run with finer steps"),
+    "tension_difference": ("1", "relative change of the largest tension in a run with finer steps"),
 }
 """Unit and meaning by variable; words have no unit."""
 
@@ -261,7 +262,7 @@ def to_markdown(whole: xr.Dataset) -> str:
     parts = ["# Stability map", summary(whole), *(_checks(whole) if "check" in whole else ())]
     parts += ["![How each cell ended](stability.png)", *engines_text(whole)]
     parts += ["## Borders", markdown_table(head, borders(whole))]
-    parts += ["## What lies beyond", _causes(whole)]
+    parts += ["## Where ok ends", _causes(whole)]
     if suspects := np.flatnonzero(whole["verdict"] == WRONG).tolist():
         parts += ["## Wrong cells", "\n".join(_cell(whole, k) for k in suspects)]
     return "\n\n".join(parts) + "\n"
@@ -276,8 +277,8 @@ def summary(whole: xr.Dataset) -> str:
     minutes = float(whole["cpu_time"].sum()) / 60.0
     panels = counted(whole.sizes["group"], "panel")
     return (
-        f"{len(verdict)} cells in {panels}: {ends}; {anew} of the ok ones after "
-        f"a new start with smaller steps; {minutes:.1f} minutes of processor time"
+        f"{counted(len(verdict), 'cell')} in {panels}: {ends}; {anew} of the ok cells after a "
+        f"restart with smaller steps; {minutes:.1f} minutes of processor time"
     )
 
 
@@ -286,12 +287,11 @@ def _checks(whole: xr.Dataset) -> list[str]:
     time, angle, tension = PROMISES.values()
     text = (
         f"{count.total() - count['']} random ok cells were run again with a quarter of the step "
-        f"and a sixteenth of the tolerance: {count['holds']} agreed to within "
-        "what ok stands for "
-        f"({100 * time:g} % of the deployment time, {angle:g} deg of the mean angle of runs "
-        f"that end before, {100 * tension:g} % of the largest tension), {count['differs']} did "
-        f"not, {count['unproven']} stayed unproven because the finer run did not end or was hardly "
-        "finer."
+        f"and a sixteenth of the tolerance: {count['holds']} agreed within the tolerance "
+        f"({100 * time:g} % of the deployment time, {angle:g} deg of the mean angle in runs that "
+        f"ended earlier, {100 * tension:g} % of the largest tension), {count['differs']} did "
+        f"not, {count['unproven']} could not be decided, because the finer run was not completed "
+        "or hardly finer."
     )
     words = ("- deployment time", "%"), ("- mean angle", "deg"), ("- largest tension", "%")
     lines = []
@@ -299,7 +299,9 @@ def _checks(whole: xr.Dataset) -> list[str]:
         values = whole[name].dropna("cell").values * (100.0 if unit == "%" else 1.0)
         if len(values):
             median, most = (f"{size:.2g} {unit}" for size in (np.median(values), values.max()))
-            lines.append(f"{label}: {median} in the median, {most} at most ({len(values)} cells)")
+            lines.append(
+                f"{label}: {median} in the median, {most} at most ({counted(len(values), 'cell')})"
+            )
     return [text, *(["\n".join(lines)] if lines else [])]
 
 
@@ -359,5 +361,5 @@ def _cell(whole: xr.Dataset, number: int) -> str:
     return (
         f"- {cell['name'].values}: {cell['x_label'].values} = {float(cell['x']):g}, "
         f"{cell['y_label'].values} = {float(cell['y']):g}: {cell['reason'].values} "
-        f"({differences or 'no cause named'})"
+        f"({differences or 'no cause given'})"
     )

@@ -100,8 +100,8 @@ def analyse(
     """
     if "sample" not in campaign.dims or "status" not in campaign:
         raise InputError(
-            "only a campaign can be analysed, and this holds no samples: give the folder that "
-            "ringsim campaign has written, or its campaign.nc"
+            "this is not a campaign: give the folder that ringsim campaign has written, or its "
+            "campaign.nc"
         )
     placed = placement(campaign)
     if requirements is None:
@@ -126,7 +126,7 @@ def analyse(
             "remarks": "\n".join(remark_lines(campaign)),
         },
     )  # fmt: skip
-    found["part"].attrs = about("share of the samples that have run, the first ones")
+    found["part"].attrs = about("share of the completed samples, counted from the first")
     stand = population_of(campaign)
     found = found.assign(statistics(stand, placed)).assign(tail(campaign)).assign(balance(campaign))
     more = [outcomes(stand, placed), matter := influence(stand, wanted, placed)]
@@ -187,7 +187,7 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
     rows: dict[str, tuple[Any, Any, str]] = {
         "": ("statistic", estimates(used, placed), "estimates"),
         "_interval": (
-            ("statistic", "bound"), interval_of(used, index, placed), "intervals of 95 %",
+            ("statistic", "bound"), interval_of(used, index, placed), "95 % intervals",
         ),
         "_convergence": (
             ("part", "statistic"), [estimates(part, placed) for part in parts],
@@ -195,9 +195,9 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
         ),
         "_samples": ("counted", [*counts, len(values) - sum(counts)], "samples"),
         "_end_sample": ("bound", index[ends], "samples with the least and the largest value"),
-        "_end_error": ("bound", bars, "numerical error that these state"),
-        "_error_of_mean": ("source", errors[:, 0], "error of the mean by its source"),
-        "_error_samples": ("source", errors[:, 1].astype("i8"), "samples that tell it"),
+        "_end_error": ("bound", bars, "their numerical error bars"),
+        "_error_of_mean": ("source", errors[:, 0], "error of the mean by source"),
+        "_error_samples": ("source", errors[:, 1].astype("i8"), "samples that have it"),
         "_largest_error": ("source", errors[:, 2], "largest error of a sample"),
         "_largest_error_sample": ("source", errors[:, 3].astype("i8"), "sample with that error"),
         "_same_within": (
@@ -244,7 +244,7 @@ def _errors(
     campaign: xr.Dataset, name: str, known: NDArray[np.bool_], placed: Placement
 ) -> Array:  # fmt: skip
     """Standard error of the mean, error bars and difference of engines, shape (source, 4): the
-    error, the samples that tell it, the largest one (NaN of the mean) and its sample (-1).
+    error, the samples that have it, the largest one (NaN of the mean) and its sample (-1).
 
     The latter two as root mean squares over the samples that have them: those of neighbouring
     samples are alike, so that they do not average out.
@@ -288,7 +288,7 @@ def balance(campaign: xr.Dataset) -> dict[str, Any]:
     found: dict[str, Any] = {
         f"balance_{word}": (
             "balance", each if word in words[:2] else each.astype("i8"),
-            about(f"{word} of the errors of balance"),
+            about(f"{word} of the balance errors"),
         )
         for word, each in zip(words, columns, strict=True)
     }  # fmt: skip
@@ -327,18 +327,18 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
             ),
             "outcome_of": (
                 "kind", np.full(len(rows), of.sum(), dtype="i8"),
-                about("samples of which the share is, all that ran"),
+                about("number of samples that ran, to which the share refers"),
             ),
             "outcome_lost": (
                 "kind", np.array([n for _, n in counts], dtype="i8"),
-                about("lost samples, which may be of the kind, too"),
+                about("failed runs, whose antennas may be of the kind, too"),
             ),
             "outcome_share": (
                 "kind", shares[:, -1] if population else ends[:, 0], about("share of the kind"),
             ),
             "outcome_share_interval": (
                 ("kind", "bound"), ends,
-                about("interval of 95 % of the share, lost samples or not"),
+                about("95 % interval of the share, whatever failed runs would have done"),
             ),
             "outcome_share_convergence": (
                 ("kind", "part"), shares if population else np.full_like(shares, np.nan),
@@ -402,9 +402,9 @@ class Evidence(Model):
         settings = [s for s in self.settings if fidelity in (None, s.fidelity)]
         if not settings:
             raise InputError(
-                f"--fidelity {fidelity}: no settings of it were measured with {self.scene}: give "
-                "--evidence from ringsim accuracy on a scene that it represents, or leave out "
-                "--fidelity"
+                f"--fidelity {fidelity}: no settings were measured for this fidelity with "
+                f"{self.scene}: give --evidence from ringsim accuracy for a scene that this "
+                "fidelity can run, or leave out --fidelity"
             )
         errors = [setting.errors.get(of, np.inf) for setting in settings]
         if min(errors) == np.inf:
@@ -414,8 +414,9 @@ class Evidence(Model):
             return next(s for s, e in zip(settings, errors, strict=True) if e <= accuracy)
         best = float(f"{1.006 * min(errors):.2e}")  # rounded up, so that asking for it succeeds
         raise InputError(
-            f"--accuracy {accuracy:g}: the best setting measured with {self.scene} is good for "
-            f"{best:.3g} in {of.replace('_', ' ')}: ask for that, or set solver.tolerance yourself"
+            f"--accuracy {accuracy:g}: the best setting measured with {self.scene} has an "
+            f"error of {best:.3g} in {of.replace('_', ' ')}: ask for that, or set solver.tolerance "
+            "yourself"
         )
 
     def values_for(self, setting: Setting, scene: Scene) -> dict[str, Any]:

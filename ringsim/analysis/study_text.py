@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.design import law_text, placement, population_of
+from ringsim.analysis.design import FAILED_RUNS, law_text, placement, population_of
 from ringsim.analysis.influence_text import (
     influence_tables,
     refusals,
@@ -63,8 +63,8 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
     laws = json.loads(analysis["reweighted_to"].item())
     law_words = "; ".join(f"{path} {law_text(law)}" for path, law in laws.items())
     first = Table((), (), [
-        f"reweighted to {law_words}: {analysis['reweighted_samples'].item()} samples count as "
-        f"{number_text(analysis['effective_samples'].item(), 3)} effective ones"
+        f"reweighted to {law_words}: {counted(analysis['reweighted_samples'].item(), 'sample')} "
+        f"worth {number_text(analysis['effective_samples'].item(), 3)} effective ones"
     ])  # fmt: skip
     rows, shares, thin = [], [], False
     for name in quantities():
@@ -92,7 +92,7 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
         few = decisive < LEAST_OF_SHARE
         thin |= few
         shares.append((
-            f"{event}{THIN * few}{'' if event == 'lost' else bent}",
+            f"{event}{THIN * few}{'' if event == FAILED_RUNS else bent}",
             estimate_text(one["reweighted_share"].item(), *ends),
             interval_text(*ends),
             number_text(decisive, 3),
@@ -104,13 +104,14 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
         )
     if thin:
         notes.append(
-            f"{THIN.strip()}: too few samples decide it (below {LEAST_OF_MEAN:g} effective of a "
-            f"mean, {LEAST_OF_SHARE:g} of others): the estimate may be far off, the interval of "
-            "a mean is too short, a quantile has none, and that of a probability holds in any case"
+            f"{THIN.strip()}: too few effective samples determine it (below {LEAST_OF_MEAN:g} "
+            f"for a mean, {LEAST_OF_SHARE:g} for others): the estimate may be far off, and the "
+            "interval of a mean is too short; quantiles have no interval, and intervals of "
+            "probabilities remain valid"
         )
     head = ("output", "unit", "statistic", "as drawn", "reweighted", "95 % interval",
-            "effective samples", "that decide it")  # fmt: skip
-    of_shares = ("probability of", "reweighted", "95 % interval", "samples that decide it")
+            "effective samples", "that determine it")  # fmt: skip
+    of_shares = ("probability of", "reweighted", "95 % interval", "samples that determine it")
     found = [first, Table(head, rows), Table(of_shares, shares, notes)]
     return [*found, _verdicts(analysis)] if "reweighted_verdict" in analysis else found
 
@@ -136,7 +137,8 @@ def _verdicts(analysis: xr.Dataset) -> Table:
 
 
 _HINT = (
-    '; require the outcome, too, as outcome = { is = "deployed", probability = P, confidence = C }'
+    '; set a requirement on the outcome, too: outcome = { is = "deployed", probability = P, '
+    "confidence = C }"
 )
 
 
@@ -168,7 +170,7 @@ def sections(analysis: xr.Dataset, folder: str = "DIR") -> dict[str, Section]:
         ),
         Section(
             "errors",
-            "What makes the numbers wrong",
+            "Numerical and statistical errors",
             error_tables(analysis),
             error_tables(analysis, every=True),
         ),
@@ -192,7 +194,7 @@ def told(analysis: xr.Dataset, folder: str = "DIR", *, full: bool = False) -> li
     """
     lines = [*head_lines(analysis)]
     if not full:
-        lines.append("all statistics with intervals and convergence, and all inputs: --full")
+        lines.append("--full gives all statistics with intervals and convergence, and all inputs")
     for each in sections(analysis, folder).values():
         chosen = each.more if full and each.more else each.tables
         parts = [table.lines() for table in chosen]
@@ -214,8 +216,8 @@ def head_lines(analysis: xr.Dataset) -> list[str]:
     lines += [*filter(None, [analysis.attrs[NOTE]]), analysis.attrs["intervals"]]
     if "tail_probability" in analysis:
         lines.append(
-            "no input is told to matter: samples of a chain repeat each other, and levels lie "
-            "beyond different thresholds"
+            "no sensitivity to inputs is given: samples of subset simulation depend on each "
+            "other, and each level has its own threshold"
         )
     if stopping := analysis.attrs["stopping"]:
         lines.append(stopping + MARK * bool(analysis.attrs[NOTE]))
@@ -232,7 +234,7 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
     try:
         found = judge(population_of(campaign), required_by(campaign.attrs), placed)
     except InputError as error:
-        return [*lines, f"the requirements cannot be judged: {error}"]
+        return [*lines, f"the requirements cannot be checked: {error}"]
     return [*lines, *slim(verdict_table(found.assign_attrs({NOTE: lost.note}))).lines()]
 
 
@@ -267,33 +269,33 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         ))  # fmt: skip
         if further > 0:
             more = counted(further, "further sample")
-            taken = counted(one["samples_lost"], "lost sample")
-            kept = f", with {taken} as violations" * bool(one["samples_lost"])
+            taken = counted(one["samples_lost"], "failed run")
+            kept = f" (if the {taken} are counted as violations)" * bool(one["samples_lost"])
             bad, used = one["samples_violating"], one["samples_used"]
             so_far = f"{bad} of {used} violate it so far; " * bool(bad)
-            notes.append(f"{name}: {so_far}{more} without a violation would show it{kept}")
+            notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
         if verdict != alone:
             notes.append(
-                f"{name}: it would be {alone.words} if lost samples were as the others, which "
-                "nobody knows: run them again (ringsim campaign --retry-failed)"
+                f"{name}: without the failed runs it would be {alone.words}; run them again "
+                "(ringsim campaign --retry-failed)"
             )
         if not one["samples_used"]:
-            notes.append(f"{name}: no sample has numbers that tell of it")
+            notes.append(f"{name}: no sample has a valid result for it")
         if short := one.get("samples_short"):
             held = one["samples_used"] - one["samples_violating"]
             hint = "" if OUTCOME in analysis["requirement"] else _HINT
             notes.append(
-                f"{name}: {short} of the {held} that keep to it ended short of their goal: had "
-                f"they gone on, they might have violated it{hint}"
+                f"{name}: {short} of the {held} that meet it ended before their goal, and might "
+                f"have violated it later{hint}"
             )
         if missing := one["samples_without_value"]:
             notes.append(
-                f"{name}: violations without a value, as the antenna did not get so far: {missing}"
+                f"{name}: violations without a value (the antenna did not get that far): {missing}"
             )
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
-        "verdict", "estimate", _SURELY, "used", "violating", "lost",
-        "if lost ones were as the others", "further",
+        "verdict", "estimate", _SURELY, "used", "violating", "failed runs",
+        "verdict without failed runs", "further",
     )  # fmt: skip
     return marked(Table(head, rows, notes), analysis, head.index("estimate"))
 
@@ -322,7 +324,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
         (
             str(kind),
             f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}"
-            + f" ({one['outcome_lost'].item()} lost)" * bool(one["outcome_lost"].item()),
+            + f" ({one['outcome_lost'].item()} failed)" * bool(one["outcome_lost"].item()),
             estimate_text(one["outcome_share"].item(), *one["outcome_share_interval"].values),
             interval_text(*one["outcome_share_interval"].values),
             *map(number_text, one["outcome_share_convergence"].values[:-1]),
@@ -384,7 +386,7 @@ def too_few() -> str:
         next(n for n in range(2, 1000) if ranks(n, level)) for level in (0.5, 0.05)
     )
     return (
-        f"too few samples for some intervals: a mean or a standard deviation takes "
+        "too few samples for some intervals: a mean or a standard deviation needs "
         f"{LEAST_OF_BOOTSTRAP}, a median {of_median}, the other quantiles {of_others}"
     )
 
@@ -434,7 +436,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
             ))  # fmt: skip
     head = (
         "output", "unit", "statistic", "estimate", "95 % interval", "in sample",
-        "its error bar", *_parts(), "used", "lost", "no value",
+        "its error bar", *_parts(), "used", "failed runs", "no value",
     )  # fmt: skip
     return marked(Table(head, rows), analysis)
 
@@ -458,7 +460,8 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         )
         mean, *_, least, most = analysis[name].values
         known = np.isfinite(errors)
-        if not (known.any() and np.isfinite(mean)) or all_alike(least, most):
+        same = all_alike(least, most) or np.isfinite(analysis[f"{name}_same_within"])
+        if same or not (known.any() and np.isfinite(mean)):
             continue
         every |= bool(known[1:].any())
         factor, units = unit_of(analysis, name)

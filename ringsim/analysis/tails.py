@@ -120,25 +120,28 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
         "tail_probability": (
             (), float(each.mean()), about(f"probability of {event}") | {"event": event},
         ),
-        "tail_probability_interval": ("bound", ends, about("interval of 95 % of that probability")),
+        "tail_probability_interval": ("bound", ends, about("95 % interval of that probability")),
         "tail_agreement": (
             (), agreement(each, chains),
-            about("probability that replicates with the errors of their chains scatter as much"),
+            about(
+                "probability of such a scatter of the replicates from the errors of their chains "
+                "alone"),
         ),
         "tail_unled": (
             (), unled,
-            about("upper bound of 97.5 % of that probability by the first levels' samples alone"),
+            about("97.5 % upper bound of that probability from the first level's samples alone"),
         ),
         "tail_unled_samples": ((), first, about("samples of the first levels")),
         "tail_variation": ((), variation, about("coefficient of variation of that probability")),
         "tail_variation_of_chains": (
-            (), of_chains, about("the same from the correlation of chains alone"),
+            (), of_chains, about("the same, from the correlation within chains alone"),
         ),
         "tail_replicate_probability": (
             "tail_replicate", each, about("probability by each replicate"),
         ),
         "tail_levels": ("tail_replicate", levels, about("levels of each replicate")),
-        "tail_lost": ((), int(lost(campaign).sum()), about("runs that failed: taken as no event")),
+        "tail_lost": ((), int(lost(campaign).sum()), about(
+            "failed runs, counted as outside the event")),
         "tail_ended": ((), int(found.ended), about("whether all levels have run")),
         **_short(design, known, found.repetitions, units),
         **_checks(campaign, design, known, found.repetitions, units),
@@ -183,7 +186,7 @@ def _short(
             (), float(each.mean()), about(f"probability of {event}") | {"event": event},
         ),
         "tail_reached_probability_interval": (
-            "bound", ends_of_interval, about("interval of 95 % of that probability"),
+            "bound", ends_of_interval, about("95 % interval of that probability"),
         ),
         "tail_nearest": (
             (), nearest, about(f"{design.of} of the run nearest to the event", units),
@@ -212,9 +215,15 @@ def _checks(
     ]
     counts = {
         "tail_checked": (inside & both, "runs in the event repeated with the full engine"),
-        "tail_confirmed": (inside & both & again, "of these, runs in the event there, too"),
-        "tail_checked_outside": (~inside & both, "runs outside the event repeated with it"),
-        "tail_missed": (~inside & both & again, "of these, runs in the event there"),
+        "tail_confirmed": (
+            inside & both & again,
+            "of these, runs in the event with the full engine, too",
+        ),
+        "tail_checked_outside": (
+            ~inside & both,
+            "runs outside the event repeated with the full engine",
+        ),
+        "tail_missed": (~inside & both & again, "of these, runs in the event with the full engine"),
     }
     return {
         **{
@@ -222,10 +231,10 @@ def _checks(
             for name, (chosen, words) in counts.items()
         },
         "tail_difference": (
-            (), apart, about(f"largest difference of {design.of} by the engines", units),
+            (), apart, about(f"largest difference of {design.of} between the engines", units),
         ),
         "tail_probability_moved": (
-            "bound", np.array(moved), about("probability with the limit moved by as much"),
+            "bound", np.array(moved), about("probability with the limit moved by this difference"),
         ),
     }  # fmt: skip
 
@@ -237,18 +246,19 @@ def short_of(found: xr.Dataset) -> list[str]:
         return []
     if "tail_reached_probability" not in found:
         none = int(np.isnan(each).sum())
-        return [f"unknown, as {none} of {len(each)} replicates have too few runs with a value"]
+        return [f"unknown: {none} of {len(each)} replicates have too few runs with a value"]
     reached, nearest = found["tail_reached_probability"], found["tail_nearest"]
     low, high = found["tail_reached_probability_interval"].to_numpy()
     short = int((each == 0.0).sum())
-    words = [f"below {high:.2g}, since {short} of {len(each)} replicates did not reach it"]
+    words = [f"below {high:.2g}: {short} of {len(each)} replicates did not reach the event"]
     if short < len(each):
         words.append(f"their mean is {each.mean():.2g}")
     return [
         *words,
-        f"the bound is that of {reached.attrs['event']}, which all reached: probability "
-        f"{float(reached):.3g} (95 % {low:.2g} .. {high:.2g})",
-        f"the nearest run has {with_unit(f'{float(nearest):.6g}', nearest.attrs['units'])}",
+        f"the bound is the probability of {reached.attrs['event']}, which all replicates "
+        f"reached: {float(reached):.3g} (95 % {low:.2g} .. {high:.2g})",
+        "the run nearest to the event has "
+        f"{with_unit(f'{float(nearest):.6g}', nearest.attrs['units'])}",
     ]
 
 
@@ -260,14 +270,14 @@ def unseen_lines(found: xr.Dataset) -> list[str]:
     samples, lines = int(found["tail_unled_samples"]), []
     if chance < DISAGREE:
         lines.append(
-            f"replicates disagree by more than the errors of their chains ({chance_text(chance)}): "
-            "the event has parts that only some of them found, so that the interval is as wide as "
-            f"their mean and the first {samples} samples allow; give more replicates, and more "
-            "samples"
+            f"the replicates differ by more than their own errors ({chance_text(chance)}): some "
+            "replicates did not find all parts of the event, so the interval is wide (from their "
+            f"mean and from the first {samples} samples); increase replicates and samples"
         )
     lines.append(
-        "parts of the event that no chain has found are in none of these numbers: the first "
-        f"{samples} samples, which no chain has led, put all of it below {most:.2g} (97.5 %)"
+        "these numbers leave out any part of the event that no chain has found; the first "
+        f"{samples} samples, which are independent, give an upper bound of {most:.2g} (97.5 %) "
+        "for the whole event"
     )
     return lines
 
@@ -283,44 +293,44 @@ def tail_table(analysis: xr.Dataset) -> Table:
     runs, lost = analysis.attrs["samples"], int(analysis["tail_lost"])
     replicates, levels = analysis.sizes["tail_replicate"], int(analysis["tail_levels"].max())
     if not int(analysis["tail_ended"]):
-        notes = ["not all levels have run: there is no probability yet"]
+        notes = ["not all levels have run yet: no probability"]
         return Table(head, [("runs so far", str(runs))], notes)
     low, high = analysis["tail_probability_interval"].to_numpy()
-    by_chains = f"{float(analysis['tail_variation_of_chains']):.2g} by the chains alone"
-    scatter = f"{float(analysis['tail_variation']):.2g} by the replicates, " * (replicates > 1)
+    by_chains = f"{float(analysis['tail_variation_of_chains']):.2g} from the chains alone"
+    scatter = f"{float(analysis['tail_variation']):.2g} from the replicates, " * (replicates > 1)
     if why := short_of(analysis):
         rows = [("probability", why[0])]
     else:
         each = (f"{p:.2g}" for p in analysis["tail_replicate_probability"].to_numpy())
         rows = [
             ("probability", f"{float(analysis['tail_probability']):.3g}"),
-            ("95 % interval, of the parts that chains found", f"{low:.2g} .. {high:.2g}"),
+            ("95 % interval, for the parts that the chains found", f"{low:.2g} .. {high:.2g}"),
             ("coefficient of variation", f"{scatter}{by_chains}"),
             ("by each replicate", ", ".join(each)),
         ]
     rows += [
         ("levels", f"{levels} at most, in {replicates} replicates"),
-        ("runs", f"{runs}, {lost} lost and taken as no event"),
+        ("runs", f"{runs}, {lost} failed and counted as outside the event"),
     ]
     if checked := int(analysis["tail_checked"]):
         confirmed = int(analysis["tail_confirmed"])
         low, high = share_interval(confirmed, checked)
         rows.append((
-            "in the event by the full engine, too",
+            "in the event with the full engine, too",
             f"{confirmed} of {checked} repeated runs (95 %: {low:.2g} .. {high:.2g} of all)",
         ))  # fmt: skip
     if outside := int(analysis["tail_checked_outside"]):
         rows.append((
-            "in the event by the full engine alone",
-            f"{int(analysis['tail_missed'])} of the {outside} nearest runs outside it, and of "
-            "those that fell short of their goal",
+            "in the event with the full engine only",
+            f"{int(analysis['tail_missed'])} of {outside} repeated runs outside the event (the "
+            "nearest ones, and those that ended before their goal)",
         ))  # fmt: skip
     if (checked or outside) and not why:
         apart = analysis["tail_difference"]
         farther, nearer = analysis["tail_probability_moved"].to_numpy()
         rows.append((
-            f"probability with the limit moved by {float(apart):.2g} {apart.attrs['units']}, what "
-            "the engines differ by",
+            f"probability with the limit moved by {float(apart):.2g} {apart.attrs['units']} "
+            "(difference of the engines)",
             f"{farther:.3g} to {nearer:.3g}",
         ))  # fmt: skip
     notes = why[1:] or unseen_lines(analysis)

@@ -48,10 +48,10 @@ Levels = tuple[float, float]
 
 
 class Condition(Model):
-    """A requirement on which the samples decide, or an output that is known precisely enough."""
+    """A requirement whose verdict is certain, or an output whose interval is short enough."""
 
     requirement: str | None = None
-    """Name under [requirements]: holds once that is met, or not met."""
+    """Name under [requirements]: holds once its verdict is met or not met."""
     of: str | None = None
     """Output whose mean, or ``quantile``, is to have an interval of 95 % of ``half_width``."""
     quantile: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
@@ -63,13 +63,12 @@ class Condition(Model):
     def _one_of_two(self) -> Condition:
         if (self.requirement is None) == (self.of is None):
             raise ValueError(
-                "needs either requirement, as { requirement = NAME }, or of, as { of = NAME, "
-                "half_width = VALUE }"
+                "needs either { requirement = NAME } or { of = NAME, half_width = VALUE }"
             )
         if self.of is None and (self.quantile is not None or self.half_width is not None):
             raise ValueError(
-                "quantile and half_width belong to of = NAME, and a requirement has its own "
-                "confidence: leave them out"
+                "quantile and half_width go with of = NAME, not with requirement, which has its "
+                "own confidence: leave them out"
             )
         if self.of is not None and self.half_width is None:
             raise ValueError(f"of = {self.of} needs half_width, in the unit of that output")
@@ -77,7 +76,7 @@ class Condition(Model):
             raise ValueError(f"of = {instead_of(self.of)}")
         if self.of is not None and self.of not in quantities():
             hint = known_or_nearest(self.of, quantities())
-            raise ValueError(f"of = {self.of} is no output with an interval ({hint})")
+            raise ValueError(f"of = {self.of} is not an output with an interval ({hint})")
         return self
 
     @property
@@ -87,12 +86,12 @@ class Condition(Model):
 
 
 class Looks(Model):
-    """After how many samples the conditions are judged: numbers that depend on nothing else."""
+    """Numbers of samples after which the conditions are checked, fixed in advance."""
 
     first: Annotated[int, Field(ge=8, le=10_000_000)] = 64
-    """Samples at the first look."""
+    """Samples at the first check."""
     growth: Annotated[float, Field(ge=1.1, le=10.0)] = 1.5
-    """Samples at a look over those at the one before."""
+    """Samples at a check over those at the one before."""
 
     def numbers(self, replicates: int = 1) -> Iterator[int]:
         """Samples at each look, without end; whole replicates of a design.
@@ -113,7 +112,7 @@ def as_list(given: Any) -> Any:
 
 
 class Rule(Model):
-    """All conditions, which must hold at the same look, and the looks."""
+    """All conditions, which must hold at the same check, and when they are checked."""
 
     conditions: list[Condition]
     looks: Looks = Looks()
@@ -239,19 +238,24 @@ def judge(
 _MEANING = {
     "probability_required": ("probability required", "f8"),
     "confidence_required": ("confidence required of each bound", "f8"),
-    "confidence_lower": ("confidence of the lower bound, more than required at many looks", "f8"),
-    "confidence_upper": ("confidence of the upper bound, more than required at many looks", "f8"),
-    "verdict": ("verdict, whatever lost samples would have done", "i1"),
-    "verdict_of_used": ("verdict if lost samples were as the others", "i1"),
-    "probability": ("share of the samples used that keep to the requirement", "f8"),
-    "probability_lower": ("one-sided lower bound of the probability, lost samples violating", "f8"),
-    "probability_upper": ("one-sided upper bound of the probability, lost samples keeping", "f8"),
-    "samples_used": ("samples whose runs are sound", "i8"),
+    "confidence_lower": (
+        "confidence of the lower bound, raised for repeated checks (stop_when)", "f8"),
+    "confidence_upper": (
+        "confidence of the upper bound, raised for repeated checks (stop_when)", "f8"),
+    "verdict": ("verdict, whatever failed runs would have done", "i1"),
+    "verdict_of_used": ("verdict without failed runs", "i1"),
+    "probability": ("share of the samples used that meet the requirement", "f8"),
+    "probability_lower": (
+        "one-sided lower bound of the probability, failed runs counted as violations", "f8"),
+    "probability_upper": (
+        "one-sided upper bound of the probability, failed runs counted as meeting it", "f8"),
+    "samples_used": ("samples with a valid result", "i8"),
     "samples_lost": ("samples whose run failed", "i8"),
     "samples_violating": ("samples used that violate the requirement", "i8"),
     "samples_without_value": ("of these, samples without a value", "i8"),
-    "samples_short": ("samples that keep to it and ended short of their goal", "i8"),
-    "further_samples": ("further samples, none violating, that would show it; -1: none", "i8"),
+    "samples_short": ("samples that meet it and ended before their goal", "i8"),
+    "further_samples": (
+        "further samples without a violation that would prove it; -1: no number would", "i8"),
 }  # fmt: skip
 
 
@@ -375,6 +379,6 @@ def stopping_lines(campaign: xr.Dataset, placed: Placement) -> list[str]:
     looks = f"{counted(len(taken), 'look')}: {', '.join(map(str, taken))}" if taken else "no look"
     kept = []
     if any(each.requirement for each in rule.conditions):
-        kept.append("bounds of its requirements hold at all looks at once")
-    kept.append("other intervals are those of a number of samples fixed before")
+        kept.append("the bounds of its requirements allow for these repeated checks")
+    kept.append("the other intervals do not")
     return [f"{first} ({looks}); {', '.join(kept)}"]

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import (
+    FAILED_RUNS,
     LOST,
     blocks_of,
     called,
@@ -46,9 +47,9 @@ _ROUND_OFF = 1e-9
 _ZERO = 273.15
 """0 C in K."""
 NOTE_ON_UNUSUAL = (
-    "inputs: first those that separate the failure from the other samples, then those that lie "
-    "outside of the central 90 % of all samples; in brackets the difference from the median of all "
-    "samples, of temperatures the value in C"
+    "unusual inputs: first those that separate the failures from the other samples, then those "
+    "outside the central 90 % of all samples; in brackets the difference from the median, for "
+    "temperatures the value in C"
 )
 
 
@@ -216,13 +217,14 @@ def worst(
     failures, failed, of, found = zip(*rows, strict=True)
     columns: dict[str, tuple[Any, dict[str, Any]]] = {
         "failure": (np.array(failures, dtype=object), {"long_name": "what failed"}),
-        "failed": (np.array(failed), about("samples that failed so")),
+        "failed": (np.array(failed), about("number of samples with this failure")),
         "of": (np.array(of), about("samples that have run")),
-        "sample": (campaign["sample"].to_numpy()[chosen], about("one of the worst of them")),
-        "found": (np.array(found, dtype=object), {"long_name": "its value, or why it ended"}),
+        "sample": (campaign["sample"].to_numpy()[chosen], about(
+            "one of the worst of these samples")),
+        "found": (np.array(found, dtype=object), {"long_name": "its value, or why the run ended"}),
         "inputs": (
             np.array(unusual(campaign, chosen, sides), dtype=object),
-            {"long_name": "what is unusual in its inputs"},
+            {"long_name": "its unusual inputs"},
         ),
     }  # fmt: skip
     return xr.Dataset({f"worst_{name}": ("worst", *each) for name, each in columns.items()})
@@ -242,7 +244,7 @@ def _sides(analysis: xr.Dataset | None, samples: int) -> dict[str, dict[str, boo
 
 def _of_failure(sides: Mapping[str, dict[str, bool]], words: str) -> dict[str, bool]:
     """What separates a failure of some of these words; all lost runs are one group."""
-    names = [_OF_LOSSES if word.startswith(LOST) else word for word in words.split("; ")]
+    names = [FAILED_RUNS if word.startswith(LOST) else word for word in words.split("; ")]
     return next((sides[name] for name in names if name in sides), {})
 
 
@@ -299,7 +301,7 @@ def worst_tables(analysis: xr.Dataset, folder: str) -> list[Table]:
         head = f"{words} ({failed} of {counted(of, 'sample')})"
         row = (str(sample), value, odd, command(folder, sample))
         found.setdefault(head, []).append(row)
-    columns = ("sample", "found", "unusual in its inputs", "run it again")
+    columns = ("sample", "found", "unusual inputs", "run it again")
     return [Table(columns, rows, left=4, title=words) for words, rows in found.items()]
 
 
@@ -324,7 +326,7 @@ def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
 
 MARK = " *"
 """Stands behind what lost runs bend."""
-_OF_LOSSES = "lost"
+_OF_LOSSES = "failed"
 """How names of groups and outcomes begin that are those of lost runs: all that ran tell them."""
 NOTE = "lost_runs"
 """Attribute that says why, of an analysis and of each of its variables that is bent."""
@@ -345,10 +347,10 @@ class Losses:
         if not self.chance < UNLIKELY:
             return ""
         return (
-            f"{self.count} of {self.ran} runs are lost, and which ones goes with inputs "
-            f"({chance_text(self.chance)}): what is marked{MARK} tells of the other "
-            f"{self.ran - self.count} alone, another population, and may be far off (run the lost "
-            "ones again: ringsim campaign --retry-failed, or narrow the inputs)"
+            f"{self.count} of {self.ran} runs failed, and whether one fails depends on the "
+            f"inputs ({chance_text(self.chance)}): numbers marked{MARK} are from the other "
+            f"{self.ran - self.count} alone, which are not representative, and may be far off "
+            "(run the failed ones again: ringsim campaign --retry-failed, or narrow the inputs)"
         )
 
     @property

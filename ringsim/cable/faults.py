@@ -68,8 +68,8 @@ class CutCable(CableFault):
     def whole(self, ropes: Ropes) -> Ropes:
         """Never."""
         raise ValueError(
-            f"faults: the rope of cable {self.cable} that parted at {self.time:g} s cannot be made "
-            "whole: keep that fault, or take a state before it (--at)"
+            f"faults: the rope of cable {self.cable} that parted at {self.time:g} s cannot be "
+            "undone: keep that fault, or start from an earlier state (--at)"
         )
 
 
@@ -123,5 +123,5 @@ class OffSheave(CableFault):
             return ropes.unjam(self.cable - 1, self.pulley - 1)
         raise ValueError(
             f"faults: the rope of cable {self.cable} that left its pulley at {self.time:g} s "
-            "cannot be put back: keep that fault, or take a state before it (--at)"
+            "cannot be undone: keep that fault, or start from an earlier state (--at)"
         )

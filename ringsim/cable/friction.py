@@ -201,8 +201,8 @@ MOST_SOLVED = 60
 SOLVED = 1e-13
 """Change of an exponent's logarithm at which they are found: round-off leaves 1e-15."""
 UNSOLVED = (
-    "no tensions go with the friction of the pulleys, which depends on them too strongly: weaken "
-    "its dependence on tension, or raise the tension of the ropes"
+    "no equilibrium of rope tension and pulley friction was found, because the friction depends "
+    "too strongly on tension: reduce this dependence, or raise the tension"
 )
 """Why a chain has no answer."""
 
@@ -222,9 +222,9 @@ class Bearing(PulleyFriction):
         if worst < radius:
             return None
         return (
-            f"friction.coefficient = {worst:g} m must be below pulley_radius = {radius:g} m: "
-            "the bearing would hold any tension where the rope turns back (lower it, or take "
-            "a larger pulley)"
+            f"friction.coefficient = {worst:g} m must be below pulley_radius = {radius:g} m: the "
+            "bearing would hold any tension where the rope turns back by 180 deg (lower it, or "
+            "use a larger pulley)"
         )
 
 

@@ -249,7 +249,7 @@ class Cables(Model):
     @model_validator(mode="after")
     def _any(self) -> "Cables":
         if self.upper is None and self.lower is None:
-            raise ValueError("upper or lower must hold a cable (or leave out the whole table)")
+            raise ValueError("upper or lower must be given (or leave out the whole table)")
         return self
 
     def present(self) -> list[tuple[int, Cable]]:
@@ -309,12 +309,12 @@ def number_of(name: str, names: Sequence[str], where: str, end: str = "") -> int
         return names.index(name) + 1
     if name == end:
         raise ValueError(
-            f'{where}: the cable is fixed there and has no pulley: the last is "{names[-1]}"'
+            f'{where}: the cable is fixed there and has no pulley: the last pulley is "{names[-1]}"'
         )
     begun = [each for each in names if each.startswith(f"{name} ")]  # a span by its pulley
     near = begun or difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     hint = f'did you mean "{near[0]}"?' if near else f'the first is "{names[0]}"'
-    raise ValueError(f"{where}: there is no place of that name ({hint})")
+    raise ValueError(f"{where}: there is no pulley or span of that name ({hint})")
 
 
 def numbered(table: dict[str, Any], points: Sequence[str]) -> dict[str, Any]:
@@ -346,7 +346,7 @@ def numbered(table: dict[str, Any], points: Sequence[str]) -> dict[str, Any]:
 
 def _listed(given: dict[str, Any], path: Sequence[str], where: str) -> list[Any]:
     if "default" not in given:
-        raise ValueError(f"{where}.default is missing: give it for all pulleys that have no own")
+        raise ValueError(f"{where}.default is missing: give the value for all other pulleys")
     values = [given["default"]] * (len(path) - 2)
     for name, value in given.items():
         if name != "default":
@@ -402,8 +402,8 @@ class BarHalfBracket(Bracket):
             return None
         return (
             f"bracket.angle = {self.angle} deg must be at most {most:g} deg, 90 deg above "
-            "structure.opening_angle: the cable would fold the bars at first "
-            "(lower it, or raise structure.opening_angle)"
+            "structure.opening_angle: the cable would first fold the bars (lower it, or raise "
+            "structure.opening_angle)"
         )
 
     def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:

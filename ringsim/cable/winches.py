@@ -382,8 +382,8 @@ def why_unlimited(cables: Cables | None, planes: tuple[str, ...]) -> str:
         for end, winch in zip(("winch", "far_winch"), cable.winches, strict=False):
             if not math.isfinite(winch.winding.available_tension()):
                 return (
-                    f'cables.{planes[plane]}.{end}.winding.kind = "{kind_of(winch.winding)}": it '
-                    'pulls with any force, so that the drive has no margin (choose kind = "motor" '
-                    'or "stall", or leave margin out)'
+                    f'cables.{planes[plane]}.{end}.winding.kind = "{kind_of(winch.winding)}": '
+                    "its force is not limited, so that no drive margin can be calculated (choose "
+                    'kind = "motor" or "stall", or leave margin out)'
                 )
     return ""

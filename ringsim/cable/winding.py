@@ -451,8 +451,8 @@ class TableWinding(PrescribedWinding):
             raise ValueError(f"times = ... {late[0]:g} s must be above the time before it")
         if self.lengths[0] != 0.0:
             raise ValueError(
-                f"lengths = {self.lengths[0]:g} m, ... must start at 0: the rope wound before "
-                "the start belongs to the cable's initial slack"
+                f"lengths = {self.lengths[0]:g} m, ... must start at 0: rope wound before the "
+                "start counts as initial slack of the cable"
             )
         return self
 

@@ -82,8 +82,8 @@ def open_folder(path: Path) -> Folder:
     table, attributes = read_design(path)
     if "sources" not in attributes:
         raise InputError(
-            f"{path}: an older ringsim began this campaign, and its results do not say what they "
-            "were run with: read its campaign.nc, and choose another folder with --out to run it"
+            f"{path}: an older version of ringsim began this campaign and cannot be continued: "
+            "use its campaign.nc as it is, or choose another folder with --out for a new campaign"
         )
     scene = scene_from_toml(attributes["scene"], source=f"{path / DESIGN}: scene")
     return Folder(path, table, scene, attributes)
@@ -122,7 +122,7 @@ def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool
     try:  # before the design is looked for: another command may write it just now
         names = sorted(entry.name for entry in path.iterdir()) if path.exists() else []
     except OSError as error:
-        raise InputError(f"{path}: this is no folder to write to: {error.strerror}") from None
+        raise InputError(f"{path}: cannot be used as a folder: {error.strerror}") from None
     if (old := opened_as(campaign, path, table, solver)) is not None:
         told = old.attributes["campaign"], old.attributes.get("suspects", "[]")
         same = told == (campaign.text, json.dumps(campaign.suspects))
@@ -131,13 +131,13 @@ def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool
     strangers = [name for name in names if not name.startswith(ours)]
     if strangers:
         raise InputError(
-            f"{path}: this folder holds {strangers[0]} and no campaign: choose a new one with --out"
+            f"{path}: this folder has other files ({strangers[0]}) and no campaign: choose a new "
+            "folder with --out"
         )
     if any((path / FOLDER).glob("*.journal")):
         raise InputError(
-            f"{path}: this folder holds results in {FOLDER}, but its {DESIGN} is gone, so nobody "
-            f"knows which campaign they belong to: bring {DESIGN} back, or choose a new folder "
-            "with --out"
+            f"{path}: this folder has results in {FOLDER}, but {DESIGN}, which describes their "
+            "campaign, is missing: restore it, or choose a new folder with --out"
         )
     return False
 
@@ -206,7 +206,7 @@ def other_build(old: Folder) -> str:
     mine = build.provenance()
     if old.attributes["sources"] == mine["sources"]:
         return ""
-    return " began this campaign, and this is ".join(
+    return " began this campaign, and you run ".join(
         f"ringsim {each['ringsim_version']} (sources {each['sources']}, commit "
         f"{each['git_commit']})"
         for each in (old.attributes, mine)
@@ -217,8 +217,8 @@ def require_this_build(old: Folder) -> None:
     """Refuse (InputError) to go on with what another build began: its models may differ."""
     if told := other_build(old):
         raise InputError(
-            f"{old.path}: {told}: results of different models do not go into one folder: go on "
-            "with that build, or choose another folder with --out"
+            f"{old.path}: {told}: one folder cannot have results of different versions: continue "
+            "with that version, or choose another folder with --out"
         )
 
 
@@ -240,16 +240,16 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
         scenes = [flat(scene.to_table()) for scene in (campaign.scene, old.scene)]
         change = _first_change(*scenes) or _first_change(wanted, held)
         if what == "its scene" and campaign.scene == old.scene:
-            change = ": an older ringsim wrote it without a key of today, and can end it"
+            change = ": it was written by an older version of ringsim, which can finish it"
         what = f"{what} differs{change}"
     elif not table.starts_with(old.table):
         what = (
-            f"its {old.table.samples} samples are not the first of the {table.samples} that "
-            f"{campaign.file.name} gives{_changed_input(table, old.table)}"
+            f"its {old.table.samples} samples are not the first of the {table.samples} of "
+            f"{campaign.file.name}{_changed_input(table, old.table)}"
         )
     if what:
         raise InputError(
-            f"{old.path}: this folder holds another campaign ({what}): choose another folder with "
+            f"{old.path}: this folder has another campaign ({what}): choose another folder with "
             "--out, or delete this one"
         )
     return old
@@ -290,13 +290,13 @@ def check_settings(scene: Scene, settings: Mapping[str, Any]) -> None:
         given = f"--set {path} = {show(value)}"
         if not path.startswith(_TABLES):
             raise InputError(
-                f"{given}: failed samples are run again with other solver.* or record.* settings "
-                "only: another antenna is another campaign, change its file and choose another "
-                "--out"
+                f"{given}: failed samples can be run again with other solver.* or record.* "
+                "settings only; for a change of the antenna change the campaign file and choose "
+                "another --out"
             )
         if path in (*_SHAPING, *scene.structure.shaping):
             raise InputError(
-                f"{given}: it shapes the result, and the samples must fit into one file: change "
-                "the campaign file and choose another --out"
+                f"{given}: it changes the size of the result, which must be equal for all "
+                "samples: change the campaign file and choose another --out"
             )
     scene.with_values(dict(settings))

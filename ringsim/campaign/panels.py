@@ -105,8 +105,8 @@ def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
     """Panels for axes ``PATH=LOW..HIGH``, default ones if none; InputError if one is refused."""
     if len(over) % 2:
         raise InputError(
-            f"--over {over[-1]}: has no partner, and a panel has two axes: give one more --over "
-            "PATH=LOW..HIGH, or leave this one out"
+            f"--over {over[-1]}: a panel needs two axes: give one more --over PATH=LOW..HIGH, or "
+            "leave this one out"
         )
     asked = [sweep_of(scene, text, points) for text in over]
     pairs = list(zip(asked[::2], asked[1::2], strict=True)) or [
@@ -116,7 +116,7 @@ def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
     ]
     if not pairs:
         raise InputError(
-            f"--over is missing: {scene.name} holds none of the default pairs of axes: give two "
+            f"--over is missing: {scene.name} has none of the default pairs of axes: give two "
             "--over PATH=LOW..HIGH"
         )
     found = []
@@ -181,9 +181,7 @@ def _expanded(scene: Scene, path: str) -> tuple[str, ...]:
         return (path,)
     present = [name for name in PLANES if getattr(scene.cables, name, None) is not None]
     if head != "cables" or not present:
-        raise InputError(
-            f"* stands for each cable of a scene, and {scene.name} has none: name a path"
-        )
+        raise InputError(f"* stands for every cable, and {scene.name} has none: name a path")
     return tuple(f"{head}.{name}.{tail}" for name in present)
 
 

@@ -4,6 +4,7 @@ is being filled.
 
 import contextlib
 import json
+import shlex
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -18,7 +19,7 @@ from ringsim.analysis.intervals import samples_needed
 from ringsim.analysis.requirements import Requirement
 from ringsim.campaign.folder import Folder, digests, opened_as
 from ringsim.campaign.run import Order, grown, growth_told
-from ringsim.campaign.stopping import End, decided, looks_of
+from ringsim.campaign.stopping import End, decided, is_behind, looks_of
 from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
 from ringsim.execution.work import Array, Work, relative_cost
@@ -29,7 +30,7 @@ from ringsim.sampling.designs.blocks import Grouped
 from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.distributions import labels_of
 from ringsim.storage.journal import Survey, survey
-from ringsim.storage.netcdf import NOT_RUN, in_use
+from ringsim.storage.netcdf import NOT_RUN, in_use, runs_in
 from ringsim.storage.result import Result, check_of, sample_of
 from ringsim.tables import counted, size_text
 from ringsim.variables import Status
@@ -58,8 +59,8 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     todo = found.missing[share.holds(found.missing)]
     design = campaign.specification.design
     lines = [
-        f"{campaign.specification.name}: {table.samples} samples "
-        f"({kind_of(design)} design), {len(todo)} to run here",
+        f"{campaign.specification.name}: {counted(table.samples, 'sample')} ({kind_of(design)} "
+        f"design), {len(todo)} to run",
         *(
             [f"  runs           {design.runs_told(table.samples)}"]
             if isinstance(design, Grouped | SubsetSimulation)
@@ -79,7 +80,7 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     if rule := campaign.specification.rule:
         numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
         looks = ", ".join(map(str, numbers)) or "none before the last sample"
-        lines.append(f"  looks          {looks} (stop_when)")
+        lines.append(f"  early stop     checked after {looks} samples (stop_when)")
     judged = survey(order.folder, run_with, checks=True)
     runs = sum(int(np.isfinite(each.seconds).sum()) for each in (found, judged))
     each, told, size = _predicted(order, table, found, todo, lambda sample: sample, runs, say)
@@ -89,7 +90,8 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
         every_run = table.samples + (-(-table.samples // every) if every else 0)
         whole = f"{size_text(size * every_run)} for all"
         lines.append(
-            f"  disk           {size_text(size)} a run, {whole}, once or twice that for {MERGED}"
+            f"  disk           {size_text(size)} a run, {whole}, and once or twice that for "
+            f"{MERGED}"
         )
     most = 0.0
     if isinstance(design, SubsetSimulation) and not design.ended:
@@ -101,8 +103,8 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
         open_ = np.intersect1d(checked, judged.missing)
         open_ = open_[share.holds(open_)]
         lines.append(
-            f"  checks         {len(checked)} samples with the full engine, too, {len(open_)} to "
-            "run here"
+            f"  checks         {counted(len(checked), 'sample')} with the full engine, too, "
+            f"{len(open_)} to run"
         )
         own, told, _ = _predicted(order, table, judged, open_, check_of, runs, say)
         lines += [f"  cost of checks {words}" for words in told]
@@ -110,8 +112,8 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     if not len(each):
         return [*lines, "  nothing is left to run"]
     whole = max(each.sum() / min(workers, len(each)), each.max())
-    checks = "; checks come on top" if getattr(design, "check", 0) else ""
-    rest = f" for these, up to {in_words(most)} with all levels{checks}" if most else ""
+    checks = ", without checks" if getattr(design, "check", 0) else ""
+    rest = f" for these, up to {in_words(most)} for all levels{checks}" if most else ""
     return [*lines, f"  predicted      about {in_words(float(whole))}{rest}"]
 
 
@@ -133,7 +135,7 @@ def _predicted(
     known = np.flatnonzero(np.isfinite(found.seconds))
     if len(known):
         per_cost = float(found.seconds[known].sum() / cost[known].sum())
-        basis = f"from {len(known)} samples that are done"
+        basis = f"from {counted(len(known), 'completed sample')}"
         written = (file.stat().st_size for file in (order.folder / "journals").iterdir())
         size = sum(written) / runs
     else:
@@ -146,7 +148,7 @@ def _predicted(
             stop=lambda: "long enough" if kept and kept[0].seconds > _SHORT else "",
         )  # fmt: skip
         check = "" if number(trial) == trial else "the check of "
-        say(f"a trial run of {check}sample {trial}, to tell the cost ...")
+        say(f"trial run of {check}sample {trial} to predict the cost ...")
         # A process's first run loads code: a short one is repeated.
         Local(1).run([number(trial)] * 2, work)
         result = kept[-1]
@@ -166,9 +168,9 @@ def _out_of_reach(requirements: Mapping[str, Requirement], samples: int) -> list
         needed = samples_needed(0, wanted.probability, wanted.confidence)
         if needed > samples:
             lines.append(
-                f"  requirement    {name}: {samples} samples cannot show a probability of "
-                f"{wanted.probability:g} with a confidence of {wanted.confidence:g}, {needed} "
-                "without a violation would"
+                f"  requirement    {name}: {counted(samples, 'sample')} cannot prove a "
+                f"probability of {wanted.probability:g} with a confidence of "
+                f"{wanted.confidence:g}; at least {needed} are needed, all without a violation"
             )
     return lines
 
@@ -198,8 +200,8 @@ def _confounded(table: Table) -> list[str]:
     both = f"{names[first.first]} and {names[first.second]}"
     return [
         f"  inputs         {both} have a rank correlation of {first.correlation:+.2f} in these "
-        f"samples{others}: the effect of one may be taken for the "
-        'other\'s; draw more samples for each replicate, or with design.kind = "random"'
+        f"samples{others}: the effect of one may be taken for that of the other; draw more "
+        'samples per replicate, or use design.kind = "random"'
     ]
 
 
@@ -245,7 +247,7 @@ def status_lines(campaign: Folder) -> list[str]:
     words = {int(Status.OK): Status.OK.word, NOT_RUN: "not_run"}
     lines = [
         f"{campaign.attributes['campaign_name']}: {campaign.table.samples - left} of "
-        f"{campaign.table.samples} samples done, {left} left",
+        f"{counted(campaign.table.samples, 'sample')} done, {left} left",
         *_stopping(campaign, planned, end),
         *([f"  runs           {growth}"] if growth else []),
         *(f"  {words[code]:<14} {counts[code]}" for code in words if counts[code]),
@@ -273,8 +275,8 @@ def status_lines(campaign: Folder) -> list[str]:
             spent, ended = spent + told["spent"], ended + told["ended"]
         called = "workers" if writer == "all" else writer
         lines.append(
-            f"  {called:<14} {state}, {counted(told['workers'], 'worker')}, "
-            f"process {told['pid']} on {told['host']}, heard of {since:.0f} s ago"
+            f"  {called:<14} {state}, {counted(told['workers'], 'worker')}, process "
+            f"{told['pid']} on {told['host']}, last report {since:.0f} s ago"
         )
     checks = campaign.survey(checks=True)
     unfinished = [
@@ -288,11 +290,22 @@ def status_lines(campaign: Folder) -> list[str]:
     if workers and ended.any():
         if ended[0]:
             rate = workers * ended[0] / max(spent[0], 1e-9)
-            beside = ", while no check runs" * bool(ended[1])
+            beside = " (without checks)" * bool(ended[1])
             lines.append(f"  rate           {rate:.3g} samples/s{beside}")
         about = time_left(campaign, left, spent / np.maximum(ended, 1), workers)
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
-    return lines
+    return [*lines, f"  next           {_next(campaign, left, growth)}"]
+
+
+def _next(campaign: Folder, left: int, growth: str) -> str:
+    """What to do next, as a command; what grows is merged once it has all its samples."""
+    folder = shlex.quote(str(campaign.path))
+    if runs_in(campaign.path):
+        return f"wait; ringsim merge {folder} gives the results so far"
+    if left or len(campaign.unchecked()) or (growth and not (campaign.path / MERGED).exists()):
+        return f"ringsim campaign FILE --out {folder} continues it"
+    verb = "merge" if is_behind(campaign.path) else "analyse"
+    return f"ringsim {verb} {folder}"
 
 
 def time_left(campaign: Folder, samples: int, each: NDArray[np.float64], workers: int) -> str:
@@ -309,7 +322,7 @@ def time_left(campaign: Folder, samples: int, each: NDArray[np.float64], workers
     told = f"about {in_words(max(shared, *(seconds for _, seconds in known)))}"
     if len(known) < len(rest):
         rest_of = counted(samples, "sample") if each[1] else counted(checks, "check")
-        told += f", and {rest_of}, of which none has ended yet"
+        told += f", plus {rest_of} of unknown duration"
     return told
 
 
@@ -320,7 +333,9 @@ def _stopping(campaign: Folder, planned: int, end: End | None) -> list[str]:
     missing = campaign.survey().missing
     first = int(missing[0]) if len(missing) else planned
     coming = [count for count in looks_of(campaign) if count > first]
-    return [f"  next look      after {coming[0]} samples (stop_when)"] if coming else []
+    return (
+        [f"  early stop     next checked after {coming[0]} samples (stop_when)"] if coming else []
+    )
 
 
 def _named(number: int) -> str:

@@ -82,7 +82,10 @@ class Campaign:
         table = {"name": name, "seed": seed, "scene": called, "inputs": inputs, "design": design}
         text = tomli_w.dumps({k: _plain(v) for k, v in (table | keys).items() if v is not None})
         if given is not None:
-            text += "\n# The scene was given as an object: the attribute scene holds all of it."
+            text += (
+                "\n# The scene was given as a Python object: see the attribute scene for all its "
+                "values."
+            )
         self._described = campaign_of(text, Path(_NAME), scene=given)
 
     def __repr__(self) -> str:
@@ -196,8 +199,8 @@ class Campaign:
         if left := len(open_folder(folder).survey().missing):
             most = self._described.specification.max_failed
             return (
-                f"{folder}: more than max_failed = {most} samples failed, {left} are left: raise "
-                "it, or mend what fails and run with retry_failed=True (and settings={...})"
+                f"{folder}: more samples than max_failed = {most} failed, {left} are left: raise "
+                "max_failed, or run again with retry_failed=True (and other settings={...})"
             )
         if apart := too_far(found):
             return f"{folder}: {apart[0]}"
@@ -223,7 +226,7 @@ def open_campaign(path: str | Path) -> xr.Dataset:
     if "sample" not in found.dims or "status" not in found:
         found.close()
         raise InputError(
-            f"{path}: holds no campaign: give the folder that ringsim campaign named, or its "
+            f"{path}: has no campaign: give the folder that ringsim campaign has written, or its "
             f"{MERGED}"
         )
     file = path / MERGED if path.is_dir() else path

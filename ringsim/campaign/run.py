@@ -40,6 +40,7 @@ from ringsim.scene import Scene
 from ringsim.storage.journal import Journal
 from ringsim.storage.netcdf import reserved
 from ringsim.storage.result import Result, check_of, sample_of
+from ringsim.tables import counted
 from ringsim.variables import GOALS, Fate, Status
 
 
@@ -163,7 +164,7 @@ def _watched(
     again = every[np.isin(before.status, list(choices.again))]
     failed, open_ = np.setdiff1d(before.failed, again), np.union1d(before.missing, again)
     if choices.overrides and not len(again):
-        _tell("no sample has failed: nothing is run again")
+        _tell("no sample has failed: nothing to run again")
     missing = again if choices.overrides else open_
     missing, mine = missing[share.holds(missing)], int(share.holds(failed).sum())
     done, total = (int(share.holds(each).sum()) for each in (np.setdiff1d(every, open_), every))
@@ -187,7 +188,9 @@ def _watched(
             stop.note(enough, signalled=False)
         count = progress.failed + len(failed) - mine
         if most is not None and count > most:
-            stop.note(f"{count} samples failed, more than max_failed = {most}", signalled=False)
+            stop.note(
+                f"{counted(count, 'sample')} failed, more than max_failed = {most}", signalled=False
+            )
         return stop.reason
 
     samples = longest_first(missing, relative_cost(campaign.table, campaign.scene))
@@ -219,13 +222,13 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
     try:
         left, failed, path = merge(campaign, execution=choices.scheduler.description, partly=False)
     except KeyboardInterrupt:
-        _tell(f"{stop.reason}; the samples are not merged yet: the same command goes on with that")
+        _tell(f"{stop.reason}; the results are not merged yet: run the same command again")
         return EXIT_INTERRUPTED
     finally:
         stop.at_once = False
     refused, campaign = [], as_decided(campaign)
     if path is not None:
-        _tell(f"{path}: {campaign.table.samples} samples, {failed} failed")
+        _tell(f"{path}: {counted(campaign.table.samples, 'sample')}, {failed} failed")
         listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
         with xr.open_dataset(path) as dataset:
             lines = [] if choices.brief else notes(dataset)
@@ -237,21 +240,21 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
             _tell(f"  {line}")
     if stop.reason and not stop.signalled and not stop.enough:
         _tell(
-            f"{stop.reason}; {left} samples are left: raise max_failed, or mend what fails and "
-            "give the same command with --retry-failed (and --set solver.tolerance=...)"
+            f"{stop.reason}; {counted(left, 'sample')} left: raise max_failed, or run the failed "
+            "ones again with --retry-failed (and --set solver.tolerance=...)"
         )
         return EXIT_FAILED
     unchecked = len(campaign.unchecked())
-    todo = f"{left} samples" + (f" and {unchecked} checks" if unchecked else "")
+    todo = counted(left, "sample") + f" and {counted(unchecked, 'check')}" * (unchecked > 0)
     alone = choices.share.count == 1 and not choices.overrides
     interrupted = (left or unchecked) and (stop.signalled or alone)
     if interrupted:
-        why = stop.reason or "some results were lost"
-        _tell(f"{why}; {todo} are left: the same command goes on with them")
+        why = stop.reason or "some results are missing"
+        _tell(f"{why}; {todo} left: run the same command again to continue")
     elif (left or unchecked) and choices.overrides:
-        _tell(f"{todo} are left: give the command without --retry-failed and --set")
+        _tell(f"{todo} left: run the command without --retry-failed and --set")
     elif left or unchecked:
-        _tell(f"this part is done; {todo} of other parts are left")
+        _tell(f"this part is done; {todo} of other parts left")
     if failed == campaign.table.samples or refused:
         return EXIT_FAILED
     return EXIT_INTERRUPTED if interrupted else EXIT_DONE
@@ -324,8 +327,9 @@ def _responses(folder: Folder, design: SubsetSimulation) -> Array:
             values[result.sample] = arrays[design.of]
         elif result.status == Status.OK and result.fate in GOALS:
             raise InputError(
-                f"design.of = {design.of}: sample {result.sample} reached its goal without a value "
-                "of it: its model does not compute it; choose another output, or another fidelity"
+                f"design.of = {design.of}: sample {result.sample} reached its goal without a "
+                "value of it, because this fidelity does not compute it: choose another output, "
+                "or another fidelity"
             )
     return design.responses(values, found.status[:count] != Status.OK)
 
@@ -358,14 +362,15 @@ class Order(NamedTuple):
         """
         if grows(self.campaign) and self.share.count > 1:
             raise InputError(
-                f"--part {self.share.number}/{self.share.count}: which samples a design of kind "
-                "subset-simulation has depends on the results of all others: leave it out, and "
-                "use --workers or MPI"
+                f"--part {self.share.number}/{self.share.count}: the samples of subset "
+                "simulation depend on the results of earlier ones, so they cannot be divided "
+                "into parts: leave --part out, and use --workers or MPI"
             )
         if grows(self.campaign) and self.again:
             raise InputError(
-                "--retry-failed: later samples of a design of kind subset-simulation follow from "
-                "the results as they are: leave it out, or choose another folder with --out"
+                "--retry-failed: the samples of subset simulation depend on the results of "
+                "earlier ones, also failed ones: leave --retry-failed out, or choose another "
+                "folder with --out"
             )
         check_settings(self.campaign.scene, self.overrides)
 
@@ -384,7 +389,7 @@ class Order(NamedTuple):
         begun = open_folder(self.folder)
         if (held := begun.attributes["campaign_name"]) != name:
             raise InputError(
-                f"{self.folder}: this folder holds the campaign {held}, not {name}: choose its "
+                f"{self.folder}: this folder has the campaign {held}, not {name}: choose another "
                 "folder with --out"
             )
         require_this_build(begun)
@@ -412,8 +417,7 @@ def require_no_launcher(workers: int | None) -> None:
     """Refuse (InputError) a number of workers under an MPI launcher."""
     if launched_size() > 1 and workers is not None:
         raise InputError(
-            f"--workers {workers}: under an MPI launcher every rank drives one solver "
-            "process: leave out --workers"
+            f"--workers {workers}: under MPI every rank has one solver process: leave out --workers"
         )
 
 

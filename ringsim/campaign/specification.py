@@ -46,8 +46,8 @@ class Specification(Model):
     """Content of a campaign file."""
 
     gone: ClassVar[dict[str, str]] = {
-        "workers": "ringsim campaign FILE --workers N says how many: leave it out",
-        "retry": "runs that fail start anew by themselves, see solver.restarts; leave it out",
+        "workers": "give it on the command line (ringsim campaign FILE --workers N): leave it out",
+        "retry": "failed runs are restarted automatically, see solver.restarts: leave it out",
     }
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
@@ -82,15 +82,15 @@ class Specification(Model):
     """Largest difference of the checked samples, as a share of the full model's value: by output,
     or one for the main outputs; beyond it the campaign ends with exit code 3."""
     error_bars_every: Annotated[int, Field(ge=0)] = 0
-    """One sample in so many states its error bars (``solver.error_bars``); 0 for none."""
+    """One sample in so many has numerical error bars (``solver.error_bars``); 0 for none."""
     max_failed: Annotated[int, Field(ge=0)] | None = None
     """The campaign stops when more samples than this have failed."""
     requirements: Requirements = Field(default_factory=dict)
-    """What outputs must be, how probably, and how surely; ``ringsim analyse`` judges it."""
+    """Bounds on outputs, with probability and confidence; ``ringsim analyse`` checks them."""
     stop_when: Annotated[list[Condition], BeforeValidator(as_list)] = Field(default_factory=list)
     """The campaign ends before its last sample once all of these hold; one or a list of them."""
     looks: Looks = Looks()
-    """After how many samples that is judged."""
+    """Numbers of samples after which ``stop_when`` is checked."""
     output: OutputTable = OutputTable()
     """How ``campaign.nc`` stores the results."""
 
@@ -109,16 +109,16 @@ class Specification(Model):
             )
         if self.max_difference is not None and not self.check_every:
             raise ValueError(
-                f"max_difference = {show(self.max_difference)} says nothing without check_every: "
-                "give both"
+                f"max_difference = {show(self.max_difference)} has no effect without "
+                "check_every: give both"
             )
         for name in self.max_difference if isinstance(self.max_difference, dict) else ():
             if name in VARIABLES and VARIABLES[name].dims:
                 raise ValueError(f"max_difference.{instead_of(name)}")
             if name not in quantities():
                 raise ValueError(
-                    f"max_difference.{name}: there is no such output to compare engines by "
-                    f"({known_or_nearest(name, quantities())})"
+                    f"max_difference.{name}: this is not an output that can be compared between "
+                    f"engines ({known_or_nearest(name, quantities())})"
                 )
         return self
 
@@ -126,19 +126,19 @@ class Specification(Model):
     def _can_stop(self) -> "Specification":
         if not self.stop_when:
             if "looks" in self.model_fields_set:
-                raise ValueError("looks says nothing without stop_when: give both, or neither")
+                raise ValueError("looks has no effect without stop_when: give both, or neither")
             return self
         kind = str(kind_of(self.design))
         if not self.design.extendable:
             raise ValueError(
-                f"stop_when: the first samples of a design of kind {kind} are no such design, so "
-                "that it cannot end before its last one: leave stop_when out, or set design.kind "
-                'to "random", or to "sobol" with design.replicates = 8'
+                f"stop_when: a {kind} design needs all its samples, so it cannot be stopped "
+                'early: leave stop_when out, or set design.kind = "random", or "sobol" with '
+                "design.replicates = 8"
             )
         if not self.design.independent and self.rule_replicates < 2:
             raise ValueError(
-                f"stop_when: the samples of one {kind} design do not tell how certain they are: "
-                'give design.replicates = 8, or set design.kind to "random"'
+                f"stop_when: one {kind} design gives no intervals: set design.replicates = 8, or "
+                'design.kind = "random"'
             )
         for each in self.stop_when:
             name = each.requirement
@@ -184,8 +184,8 @@ class Campaign:
         for path in [column.path for column in table.columns if column.path]:
             if given := path if path in wanted.set else first_inside(path, wanted.set):
                 raise InputError(
-                    f"{self.file.name}: {given} has one value by [set] or --set, and others by the "
-                    "inputs: leave out one of the two"
+                    f"{self.file.name}: {given} is set by [set] or --set and also drawn as an "
+                    "input: leave out one of the two"
                 )
         return table
 
@@ -218,8 +218,8 @@ def campaign_of(
         kind = kinds_of(Design).get(str(design.get("kind")))
         if kind is not None and "samples" not in kind.model_fields:
             raise InputError(
-                f"--samples {samples}: a design of kind {show(design.get('kind'))} has as many as "
-                "its levels or its file give: leave it out"
+                f"--samples {samples}: a design of kind {show(design.get('kind'))} has a fixed "
+                "number of samples, given by its levels or its file: leave it out"
             )
         design["samples"] = samples
         text += f"\n# called with --samples {samples}"
@@ -240,14 +240,15 @@ def campaign_of(
     if (interval := varied.record.state_interval) is not None:
         raise InputError(
             f"{path.name}: record.state_interval = {interval:g} s: campaigns store no states: "
-            "leave it out, and run the sample of interest alone (ringsim replay tells its scene)"
+            "leave it out, and run the sample of interest alone (ringsim replay --scene prints "
+            "its scene)"
         )
     wanted = {f"requirements.{name}": name for name in specification.requirements}
     wanted |= {f"stop_when.of = {each.of}": each.of for each in specification.stop_when if each.of}
     for where, name in wanted.items():
         if absent := sorted(set(VARIABLES[name].needs) - holds(varied)):
             raise InputError(
-                f"{path.name}: {where}: runs of this scene have no such output, "
-                f"because it has no {absent[0]}: leave it out, or add that to the scene"
+                f"{path.name}: {where}: runs of this scene do not have this output, because the "
+                f"scene has no {absent[0]}: leave it out, or add that to the scene"
             )
     return Campaign(path, text, specification, varied)

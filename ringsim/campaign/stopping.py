@@ -196,8 +196,9 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
                 return left, failed, None
             if left == campaign.table.samples:
                 raise InputError(
-                    f"{campaign.path}: none of its {left} samples has run, so there is nothing to "
-                    f"merge: run ringsim campaign with the file of {design['campaign_name']} first"
+                    f"{campaign.path}: no sample has run, so there is nothing "
+                    "to merge: first run ringsim campaign with the file of "
+                    f"{design['campaign_name']}"
                 )
             try:
                 failed += write_merged(

@@ -71,10 +71,14 @@ def run_ladder(
         if why:
             raise InputError(f"--fidelity {FRAME}: {why}")
         rungs = frames_alone(rungs)
-        remarks.append("a study of the frame engine alone: the reference is its own limit")
+        remarks.append(
+            "a study of the frame engine only: the reference is the limit of its own fine steps"
+        )
     if brief:
         rungs = shortened(rungs)
-        remarks.append("a brief study: steps down to a quarter, elements up to twice the scene's")
+        remarks.append(
+            "a brief study: steps down to a quarter of the scene's, up to twice as many elements"
+        )
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs, fidelity=fidelity)
@@ -84,9 +88,9 @@ def run_ladder(
         found = study.run(stage, own)
         failed |= {places[k]: told for k, told in _failures(own, found).items()}
         _require_references(rungs, failed, fidelity)
-    remarks += [f"{told}; the reference is made of other runs" for told in failed.values()]
+    remarks += [f"{told}; other runs form the reference" for told in failed.values()]
     if why:
-        remarks.append(f"the frame engine is left out: {why}")
+        remarks.append(f"without the frame engine: {why}")
     elif fidelity != FRAME:
         rungs += by_frames(rungs)
     results = study.run("settings", rungs)
@@ -115,8 +119,8 @@ def _require_references(rungs: Sequence[Rung], failed: dict[int, str], fidelity:
         references(rungs, [k not in failed for k in range(len(rungs))], fidelity)
     except ValueError:
         raise ReferenceRunError(
-            f"{next(iter(failed.values()))}: change the scene so that it ends well with fine "
-            "steps, or give it more time (--timeout)"
+            f"{next(iter(failed.values()))}: change the scene so that runs with fine steps are "
+            "completed, or allow more time (--timeout)"
         ) from None
 
 

@@ -14,19 +14,19 @@ from ringsim.refusal import InputError, known_or_nearest
 
 VERBS = {
     "scenes": "List the built-in scenes.",
-    "check": "Check a scene file and say what it builds.",
+    "check": "Check a scene file and summarise its model.",
     "run": "Run one scene.",
     "plot": "Draw the figures of a run or a campaign from its file.",
     "export": "Write results as tables, for MATLAB or for ParaView.",
-    "explain": "Say what variables of results, and keys of files, mean.",
+    "explain": "Explain variables of results and keys of files.",
     "campaign": "Run a campaign, or finish an interrupted one.",
-    "status": "Tell how far a campaign is.",
-    "merge": "Put the results of a campaign into one file.",
-    "analyse": "Say what a campaign tells: verdicts, statistics with intervals, errors.",
-    "report": "Write one page about a campaign: outcomes, figures, failures, model.",
-    "compare": "Say how one campaign or run differs from another.",
-    "replay": "Run one sample of a campaign again, in the foreground.",
-    "stability": "Map where the solver is sound, and how runs end where it is not.",
+    "status": "Show the progress of a campaign.",
+    "merge": "Write the results of a campaign so far to one file.",
+    "analyse": "Analyse a campaign: requirements, statistics with intervals, errors.",
+    "report": "Write one HTML page about a campaign: outcomes, figures, failures, model.",
+    "compare": "Compare two campaigns, or two runs.",
+    "replay": "Run one sample of a campaign again.",
+    "stability": "Map which settings the solver can run, and how other runs end.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",
 }
 """Verb and its line of help; its command is ``VERB_command`` in the file of ``_FILES``."""
@@ -80,8 +80,9 @@ class _Verbs(click.Group):
             # netCDF4 takes names of files as text, and this process cannot write them as such.
             told = error.object.encode("ascii", "replace").decode("ascii")
             click.echo(
-                f"{told}: a name of a file or folder has letters that this locale "
-                f"({sys.getfilesystemencoding()}) cannot write: set PYTHONUTF8=1, or rename it",
+                f"{told}: a file or folder has a name that this locale "
+                f"({sys.getfilesystemencoding()}) cannot represent: set PYTHONUTF8=1, or rename "
+                "it",
                 err=True,
             )
             ctx.exit(EXIT_BAD_INPUT)

@@ -45,15 +45,21 @@ from ringsim.variables import GOALS, TIMINGS, Outcome
     "--samples", type=click.IntRange(1, 10_000_000), metavar="N",
     help="Draw N samples instead of as many as the file says.",
 )  # fmt: skip
-@click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME).")
+@click.option("--out", metavar="DIR", type=PATH, help="Folder of the results (default runs/NAME).")
 @click.option(
-    "--part", metavar="I/N", default="1/1", help="Run only the I-th of N shares of the samples."
+    "--part", metavar="I/N", default="1/1", help="Run only the I-th of N parts of the samples."
 )
 @click.option(
     "--retry-failed", is_flag=True,
-    help="Run the failed samples again, too; with --set only these, with other solver settings.",
+    help=
+        "Run failed samples again, too. With --set: only failed samples, with these solver "
+        "settings.",
 )  # fmt: skip
-@click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
+@click.option(
+    "--dry-run",
+    is_flag=True,
+    help="Check the file, and show what would run and its predicted cost; store nothing.",
+)
 @click.option("--plot", is_flag=True, help="Draw figures beside campaign.nc.")
 @PLOT_FORMAT
 @click.option("--solver", default="", hidden=True)
@@ -63,7 +69,7 @@ def campaign_command(
     out: Path | None, part: str, *, retry_failed: bool, dry_run: bool, plot: bool,
     formats: Formats, solver: str, judge: str,
 ) -> int:  # fmt: skip
-    """Run the campaign of FILE; the same command again goes on with what is missing.
+    """Run the campaign of FILE; the same command again continues it.
 
     Under mpiexec or srun every rank computes, and --workers is left out.  Exit codes: 0 all
     samples have run (some may have failed, up to max_failed), 3 too many or all of them failed, or
@@ -105,8 +111,8 @@ def campaign_command(
 @click.command()
 @FOLDER
 def status_command(folder: Path) -> None:
-    """Tell how many samples of the campaign in FOLDER are done, failed, running and left, and what
-    the antenna did.
+    """Show how many samples of the campaign in FOLDER are done, failed, running and left, their
+    outcomes, and the next command.
 
     It only reads, and may be called while the campaign runs.
     """
@@ -132,10 +138,12 @@ def _rounded(value: Any) -> str:
 @click.command()
 @FOLDER
 @click.argument("sample", type=int)
-@click.option("--scene", is_flag=True, help="Print the sample's scene and do not run it.")
-@click.option("--check", is_flag=True, help="Repeat the sample's check by the full engine instead.")
+@click.option("--scene", is_flag=True, help="Print the sample's scene without running it.")
+@click.option(
+    "--check", is_flag=True, help="Repeat the sample's check with the full engine instead."
+)
 @click.option("--save", metavar="FILE", type=PATH, help="Write the run to a netCDF file.")
-@click.option("--solver", "allowed", hidden=True, default="", help="As of ringsim campaign.")
+@click.option("--solver", "allowed", hidden=True, default="", help="As for ringsim campaign.")
 def replay_command(
     folder: Path, sample: int, *, scene: bool, check: bool, save: Path | None, allowed: str
 ) -> int:
@@ -157,15 +165,16 @@ def replay_command(
     if check:
         if "judge" not in campaign.attributes:
             raise InputError(
-                f"--check: the samples of {folder} have no checks (check_every): leave it out"
+                f"--check: {folder} has no checks with the full engine (check_every): leave it out"
             )
         solver, number = campaign.attributes["judge"], check_of(sample)
     modules = {name.partition(":")[0] for name in (*SOLVERS.values(), allowed) if name}
     if solver.partition(":")[0] not in modules:
         # A file from elsewhere must not choose what code runs.
         raise InputError(
-            f"{folder}: its design.nc names the solver {solver!r}, which is none of ringsim's "
-            f"({', '.join(SOLVERS.values())}): replay the campaign with the ringsim that ran it"
+            f"{folder}: its design.nc names the solver {solver!r}, which ringsim does not have "
+            f"({', '.join(SOLVERS.values())}): replay the campaign with the version of ringsim "
+            "that ran it"
         )
     before = next(campaign.survey(checks=check).results([sample]), None)
     values = campaign.table.values_of(sample) | (before.overrides if before is not None else {})
@@ -259,5 +268,5 @@ def judged(different: list[str], new: Arrays, old: Arrays, bars: Arrays) -> list
         how = "ABOVE" if beyond else "below"
         lines.append(f"{how} the error bars: {', '.join(beyond or within)}")
     else:
-        lines.append("none of these has an error bar")
+        lines.append("none of these outputs has an error bar")
     return lines

@@ -27,7 +27,7 @@ def _assigned(_context: Any, _option: Any, texts: tuple[str, ...]) -> dict[str, 
 def _formats(_context: Any, _option: Any, text: str | None) -> Formats:
     if text is None:
         return None
-    return listed("--plot-format", text, PLOT_FORMATS, "is no format of a figure")
+    return listed("--plot-format", text, PLOT_FORMATS, "is not a figure format")
 
 
 def listed(option: str, text: str, known: Sequence[str], wrong: str) -> tuple[str, ...]:
@@ -59,10 +59,10 @@ def _paths(_context: Any, _option: Any, begun: str) -> list[CompletionItem]:
 PLOT_FORMATS = ("png", "svg", "pdf")
 PLOT_FORMAT = click.option(
     "--plot-format", "formats", metavar="png,svg,pdf", callback=_formats,
-    help="Formats of the figures, one or more (default png).",
+    help="File formats of the figures, one or more (default png).",
 )  # fmt: skip
 ANIMATE = click.option(
-    "--animate", is_flag=True, help="Write a GIF of the structure as it moves, too."
+    "--animate", is_flag=True, help="Also write an animated GIF of the structure."
 )
 COLOUR = click.option(
     "--colour", metavar="lag|stress", default=None,
@@ -84,7 +84,7 @@ def require_with(option: str, value: object, other: str, given: object) -> None:
     if value is not None and not given:
         told = ",".join(value) if isinstance(value, tuple) else value
         told = "" if value is True else f" {told}"  # a flag has no value
-        raise InputError(f"{option}{told}: says nothing without {other}; give both")
+        raise InputError(f"{option}{told}: has no effect without {other}; give both")
 
 
 def draw_figures(dataset: "xr.Dataset", folder: Path, name: str, formats: Formats) -> list[Path]:

@@ -41,11 +41,11 @@ def opened(path: Path) -> xr.Dataset:
     if any(path.glob("journals/*")) and is_behind(path) and not runs_in(path):
         left, _, _ = merge(open_folder(path), execution="merged on its own", partly=True)
         told = f", {counted(left, 'sample')} not run" if left else ""
-        click.echo(f"{path}: merged its results into {MERGED} first{told}")
+        click.echo(f"{path}: merged its results into {MERGED}{told}")
     if path.is_dir() and not (path / MERGED).exists() and runs_in(path):
         raise InputError(
-            f"{path}: this campaign runs just now, and its end merges its results: wait for that, "
-            f"or give ringsim merge {path} to see what there is"
+            f"{path}: this campaign is running, and merges its results at its end: wait for "
+            f"that, or run ringsim merge {path} for the results so far"
         )
     return open_stored(path)
 
@@ -62,7 +62,10 @@ def merge_command(folder: Path) -> None:
     campaign = open_folder(folder)
     left, failed, path = merge(campaign, execution="merged on its own", partly=True)
     samples = as_decided(campaign).table.samples
-    click.echo(f"{path}: {samples} samples, {samples - left} done, {left} not run, {failed} failed")
+    click.echo(
+        f"{path}: {counted(samples, 'sample')}, {samples - left} done, {left} not run, "
+        f"{failed} failed"
+    )
     if path is not None:
         with xr.open_dataset(path) as dataset:
             for line in [*notes(dataset), *check_lines(dataset), *verdict_lines(dataset)]:
@@ -73,29 +76,33 @@ def merge_command(folder: Path) -> None:
 @click.argument("source", metavar="DIR|FILE", type=PATH)
 @click.option(
     "--require", "required", metavar="REQUIREMENT", multiple=True,
-    help="Judge a requirement, too, or in place of the file's on that output: 'asynchrony_max: max "
-    "10, probability 0.99, confidence 0.9', 'outcome: is deployed, probability ...'.",
+    help=
+        "Check this requirement, too, or in place of the campaign file's on that output: "
+        "'asynchrony_max: max 10, probability 0.99, confidence 0.9', 'outcome: is deployed, "
+        "probability ...'.",
 )  # fmt: skip
 @click.option(
     "--reweight", "reweighted", metavar="INPUT", multiple=True,
-    help="Tell also what another distribution of a drawn input would give, without new runs: "
-    "'loads.force = { kind = \"normal\", mean = 0.012, standard_deviation = 1e-4 }'.",
+    help=
+        "Also estimate the results for another distribution of a drawn input, without new runs: "
+        "'loads.force = { kind = \"normal\", mean = 0.012, standard_deviation = 1e-4 }'.",
 )  # fmt: skip
 @click.option(
     "--full", is_flag=True,
-    help="Tell the interval and the convergence of every statistic, and every measure of what "
-    "matters, whatever chance would explain.",
+    help=
+        "Print every statistic with its interval and convergence, and all sensitivity measures, "
+        "significant or not.",
 )  # fmt: skip
 @click.option(
     "--gate", is_flag=True,
-    help="End with exit code 4 unless every requirement is met; one that is not yet shown is not.",
+    help="Return exit code 4 unless every requirement is shown to be met.",
 )  # fmt: skip
-@click.option("--out", metavar="FILE", type=PATH, help="Write all of it to a netCDF file.")
+@click.option("--out", metavar="FILE", type=PATH, help="Also write the results to a netCDF file.")
 def analyse_command(
     source: Path, required: tuple[str, ...], reweighted: tuple[str, ...], full: bool, gate: bool,
     out: Path | None,
 ) -> int:  # fmt: skip
-    """Say what the campaign in DIR (or its campaign.nc) tells: verdicts on requirements, shares of
+    """Analyse the campaign in DIR (or its campaign.nc): verdicts on requirements, shares of
     outcomes, statistics of outputs with intervals that fit the design, which error dominates, and
     which inputs matter.
 
@@ -114,8 +121,8 @@ def analyse_command(
         wanted = required_by(campaign.attrs) | wanted
         if gate and not wanted:
             raise InputError(
-                f"--gate: {source} has no requirements to meet: give some under [requirements], or "
-                "with --require"
+                f"--gate: {source} has no requirements: give some under [requirements], or with "
+                "--require"
             )
         try:
             found = analyse(campaign, wanted, others)
@@ -142,9 +149,9 @@ def _save(found: xr.Dataset, out: Path | None) -> None:
 @click.option("--out", metavar="FILE", type=PATH, default=Path("report.html"), show_default=True)
 @click.option(
     "--analysis", metavar="FILE", type=PATH,
-    help="File of ringsim analyse --out with what to show instead of an analysis of today.",
+    help="Show the analysis in this file (from ringsim analyse --out) instead of a new one.",
 )  # fmt: skip
-@click.option("--pdf", is_flag=True, help="Print it, too, with chromium: the same name in .pdf.")
+@click.option("--pdf", is_flag=True, help="Also write a PDF of the same name (needs chromium).")
 def report_command(folder: Path, out: Path, analysis: Path | None, pdf: bool) -> None:
     """Write one page about the campaign in DIR, or in a file campaign.nc.
 
@@ -160,7 +167,7 @@ def _require_page(option: str, out: Path, *, pdf: bool) -> None:
     """That a page can be written there, and printed; InputError if not."""
     require_place(out)
     if out.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{option} {out}: the page is HTML: write {out.stem}.html")
+        raise InputError(f"{option} {out}: the page is HTML: give a name such as {out.stem}.html")
     if pdf:
         from ringsim.report.shell import require_browser
 
@@ -174,7 +181,7 @@ def _told_page(out: Path, size: int, *, pdf: bool) -> None:
 
     click.echo(f"wrote {out} ({size / 1e6:.2f} MB)")
     if size > LARGEST:
-        click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the size it is meant to have")
+        click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the largest size intended")
     if pdf:
         write_pdf(out, out.with_suffix(".pdf"))
         click.echo(f"wrote {out.with_suffix('.pdf')}")
@@ -184,12 +191,14 @@ def _write(campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None) -
     from ringsim.report.page import write_report
 
     if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
-        raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
+        raise InputError(
+            f"{file}: has no campaign: give the folder that ringsim campaign has written"
+        )
     known = None if analysis is None else _load(analysis)
     if known is not None and "statistic" not in known.dims:
         raise InputError(
-            f"--analysis {analysis}: holds no analysis: give what ringsim analyse --out has "
-            "written, or leave it out"
+            f"--analysis {analysis}: has no analysis: give a file of ringsim analyse --out, or "
+            "leave it out"
         )
     return write_report(campaign, out, str(file.parent), known)
 
@@ -211,7 +220,7 @@ def _load(file: Path) -> xr.Dataset:
 @COLOUR
 @click.option(
     "--sample", type=int, metavar="N",
-    help="The sample of a campaign that --animate shows (default: the worst).",
+    help="Sample of a campaign for --animate (default: the worst).",
 )  # fmt: skip
 @click.option("--out", metavar="DIR", type=PATH, help="Folder for the figures (default: FILE's).")
 def plot_command(
@@ -232,7 +241,7 @@ def plot_command(
         needed = {"scene", "campaign"} if campaign else {"scene", "reason"}
         if not needed <= dataset.attrs.keys() or "status" not in dataset:
             raise InputError(
-                f"{file}: holds neither a run nor a campaign: give a file that ringsim run or "
+                f"{file}: has neither a run nor a campaign: give a file that ringsim run or "
                 "ringsim campaign has written (campaign.nc)"
             )
         folder = out or file.parent
@@ -240,7 +249,7 @@ def plot_command(
         if why := left_out(dataset):
             click.echo(why)
         if not drawn:
-            click.echo(f"{file}: nothing to draw: no run got as far as its first record")
+            click.echo(f"{file}: nothing to draw: no run reached its first recorded time")
         elif animate:
             run, name = _shown(dataset, sample, file)
             write_animation(run.load(), folder / f"{name}.gif", colour)
@@ -250,7 +259,7 @@ def _shown(dataset: xr.Dataset, sample: int | None, file: Path) -> tuple[xr.Data
     """The run to animate, and the name of its file."""
     if "sample" not in dataset.dims:
         if sample is not None:
-            raise InputError(f"--sample {sample}: {file} holds one run: leave it out")
+            raise InputError(f"--sample {sample}: {file} has only one run: leave it out")
         return dataset, file.stem
     if sample is None:
         chosen = median_and_worst(dataset)
@@ -262,7 +271,7 @@ def _shown(dataset: xr.Dataset, sample: int | None, file: Path) -> tuple[xr.Data
 def _require_sample(dataset: xr.Dataset, sample: int, file: Path) -> None:
     if sample not in dataset["sample"]:
         raise InputError(
-            f"--sample {sample}: {file} holds samples 0 to {dataset.sizes['sample'] - 1}"
+            f"--sample {sample}: {file} has samples 0 to {dataset.sizes['sample'] - 1}"
         )
 
 
@@ -270,14 +279,14 @@ def _require_sample(dataset: xr.Dataset, sample: int, file: Path) -> None:
 @click.argument("first", type=PATH)
 @click.argument("second", type=PATH)
 @click.option(
-    "--report", "page", metavar="FILE", type=PATH, help="Write it as one page with figures, too."
+    "--report", "page", metavar="FILE", type=PATH, help="Also write an HTML page with figures."
 )
-@click.option("--pdf", is_flag=True, help="Print the page, too, with chromium.")
-@click.option("--out", metavar="FILE", type=PATH, help="Write all of it to a netCDF file.")
+@click.option("--pdf", is_flag=True, help="Also write the page as PDF (needs chromium).")
+@click.option("--out", metavar="FILE", type=PATH, help="Also write the results to a netCDF file.")
 def compare_command(
     first: Path, second: Path, page: Path | None, out: Path | None, *, pdf: bool
 ) -> None:
-    """Say how SECOND differs from FIRST: two campaigns (folders or files), or two runs.
+    """Compare SECOND with FIRST: two campaigns (folders or files), or two runs.
 
     Samples with equal seeds or inputs are compared in pairs, which shows much smaller differences.
     """
@@ -314,7 +323,7 @@ FORMATS = ("csv", "mat", "pvd")
 
 
 def _formats(_context: Any, _option: Any, text: str) -> tuple[str, ...]:
-    return listed("--format", text, FORMATS, "is no format to export to")
+    return listed("--format", text, FORMATS, "is not an export format")
 
 
 def _names(_context: Any, _option: Any, text: str) -> tuple[str, ...]:
@@ -329,7 +338,7 @@ def _names(_context: Any, _option: Any, text: str) -> tuple[str, ...]:
 )  # fmt: skip
 @click.option(
     "--sample", "samples", metavar="N", type=int, multiple=True,
-    help="Only this sample of a campaign; may be given more than once.",
+    help="Only this sample of a campaign; can be given several times.",
 )  # fmt: skip
 @click.option(
     "--variables", "names", metavar="NAME,NAME", default="", callback=_names,
@@ -347,16 +356,17 @@ def export_command(
         campaign = "sample" in dataset.dims
         if "status" not in dataset or "scene" not in dataset.attrs:
             raise InputError(
-                f"{file}: holds neither a run nor a campaign: give what ringsim run or ringsim "
+                f"{file}: has neither a run nor a campaign: give what ringsim run or ringsim "
                 "campaign has written"
             )
         if samples and not campaign:
-            raise InputError(f"--sample {samples[0]}: {file} holds one run: leave it out")
+            raise InputError(f"--sample {samples[0]}: {file} has only one run: leave it out")
         for sample in samples:
             _require_sample(dataset, sample, file)
         if campaign and "pvd" in formats and not samples:
             raise InputError(
-                "--format pvd: shows runs, and this is a campaign: choose some with --sample"
+                "--format pvd: is for single runs, and this is a campaign: choose samples with "
+                "--sample"
             )
         chosen = dataset.sel(sample=list(samples)) if samples else dataset
         # Stored states mean nothing to other programs.
@@ -386,7 +396,7 @@ def export_command(
 def _only(dataset: xr.Dataset, names: tuple[str, ...], formats: tuple[str, ...]) -> xr.Dataset:
     """The dataset with some of its variables; InputError if it has not all of them."""
     if not {"csv", "mat"} & set(formats):
-        raise InputError("--variables: says nothing to --format pvd: leave it out")
+        raise InputError("--variables: has no effect with --format pvd: leave it out")
     known = [str(name) for name in dataset.data_vars]
     # Inputs have the names that analyse and the report give them, too.
     own = {called(dataset[name]): name for name in inputs(dataset)}
@@ -394,5 +404,5 @@ def _only(dataset: xr.Dataset, names: tuple[str, ...], formats: tuple[str, ...])
     for name in names:
         if name not in known:
             hint = known_or_nearest(name, known)
-            raise InputError(f"--variables {name}: is no variable of this file ({hint})")
+            raise InputError(f"--variables {name}: is not a variable of this file ({hint})")
     return dataset[list(names)]

@@ -78,26 +78,32 @@ class _Fidelity(click.Choice[str]):
 @click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write (default SCENE.nc).")
 @click.option(
     "--fidelity", type=_Fidelity(["full", "frame", "both"]),
-    help="Full model; the same in joint coordinates (frame: closed and open rings, some thirty "
-    "times as fast); both, with a table of their differences.  [default: what --accuracy picks, or "
-    "frame wherever the scene allows it]",
+    help=
+        "Engine: full (exudyn), frame (for rings, about thirty times as fast), or both, with a "
+        "table of their differences.  [default: frame if it can run the scene, else full; or "
+        "what --accuracy selects]",
 )  # fmt: skip
 @click.option(
     "--accuracy", metavar="ERROR", type=click.FloatRange(1e-8, 1.0),
-    help="Relative error of deployment time and opening angle to aim at: picks the "
-    "cheapest settings, and engine, measured to give it.",
+    help=
+        "Target for the relative error of deployment time and opening angle: selects the "
+        "cheapest engine and settings that were measured to reach it.",
 )  # fmt: skip
 @click.option(
     "--of", metavar="OUTPUT",
-    help="Aim --accuracy at another output: loads, asynchrony, peak_tension, ...",
+    help="Output for --accuracy instead: loads, asynchrony, peak_tension, ...",
 )  # fmt: skip
 @click.option(
     "--evidence", metavar="FILE", type=PATH,
-    help="settings.toml of ringsim accuracy (default: that of the built-in scene most alike).",
+    help=
+        "Measured settings, settings.toml of ringsim accuracy (default: of the most similar "
+        "built-in scene).",
 )  # fmt: skip
 @click.option(
     "--from", "origin", metavar="FILE", type=PATH,
-    help="Go on from a state that a run has stored (record.state_interval) in its netCDF file.",
+    help=
+        "Continue from a state that an earlier run has stored in its netCDF file "
+        "(record.state_interval).",
 )  # fmt: skip
 @click.option(
     "--at", metavar="TIME", type=click.FloatRange(min=0.0),
@@ -142,7 +148,7 @@ def run_command(
         if fidelity is not None or start is not None:
             raise
         # Behind the last colon stands the cure, which is taken here.
-        click.echo(f"the full model runs it: {str(error).rpartition(': ')[0] or error}")
+        click.echo(f"using the full model: {str(error).rpartition(': ')[0] or error}")
         outcomes = {"full": watched(engines["full"], chosen)}
     if start is not None:  # told once nothing has refused it
         click.echo(outcomes[asked[0]].began)
@@ -180,11 +186,11 @@ def run_command(
         drawn = chosen.structure.locks and kind_of(chosen.rods) != "ancf"
         # Not recorded for the figure: steps that resolve the rods' vibration are another run.
         if drawn and not chosen.record.stress:
-            click.echo("stresses are drawn with --set record.stress=true")
+            click.echo("figures of stress need --set record.stress=true")
     if animate:
         write_animation(dataset, target.with_suffix(".gif"), colour)
         if not chosen.record.positions:
-            click.echo("it shows computed positions with --set record.positions=true")
+            click.echo("computed positions need --set record.positions=true")
     failed = any(outcome.status.failed for outcome in outcomes.values())
     return EXIT_FAILED if failed else EXIT_DONE
 
@@ -194,7 +200,7 @@ def _start(origin: Path | None, at: float | None) -> "StoredState | None":
     from ringsim.stored_state import read_state
 
     if origin is None and at is not None:
-        raise InputError(f"--at {at:g}: says nothing without --from; give both")
+        raise InputError(f"--at {at:g}: has no effect without --from; give both")
     return None if origin is None else read_state(origin, at)
 
 
@@ -224,8 +230,8 @@ def _with_accuracy(
 
     if fidelity == "both":
         raise InputError(
-            f"--accuracy {accuracy:g}: its settings were measured with the full model and the "
-            f"frame engine, not with --fidelity {fidelity}: leave out one of the two"
+            f"--accuracy {accuracy:g}: settings were measured for the full and the frame engine, "
+            f"not for --fidelity {fidelity}: leave out one of the two"
         )
     if (output := of or JUDGED_BY) not in CHOICES:
         raise InputError(f"--of {output}: must be one of {', '.join(CHOICES)}")
@@ -236,10 +242,12 @@ def _with_accuracy(
     if picked.fidelity == "frame" and fidelity is None and why_not_frame(changed):
         picked = known.pick(accuracy, output, "full")
     if clash := sorted(set(picked.values) & set(given)):
-        raise InputError(f"--set {clash[0]}: --accuracy chooses it: leave out one of the two")
+        raise InputError(
+            f"--set {clash[0]}: --accuracy selects this value: leave out one of the two"
+        )
     values = known.values_for(picked, changed)
     words = ", ".join(f"{path} = {value}" for path, value in values.items())
     errors = ", ".join(f"{name.replace('_', ' ')} {e:.2g}" for name, e in picked.errors.items())
     click.echo(f"settings for {accuracy:g}: fidelity = {picked.fidelity}, {words}")
-    click.echo(f"  measured with {known.scene} to be good for: {errors}")
+    click.echo(f"  errors measured with {known.scene}: {errors}")
     return scene.with_values(values), picked.fidelity

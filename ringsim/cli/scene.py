@@ -45,7 +45,7 @@ SCHEMA = "scene.schema.json"
 @click.argument("name", required=False)
 @click.option(
     "--out", metavar="FILE", type=PATH,
-    help="Write it to this file, and a schema for editors beside it.",
+    help="Write the scene to this file, with a schema for editors beside it.",
 )  # fmt: skip
 def scenes_command(name: str | None, out: Path | None) -> None:
     """List the built-in scenes, or print the TOML of one.
@@ -99,11 +99,13 @@ MOST_SECTIONS_FOR_MOBILITY = 72
 @SETTINGS
 @click.option(
     "--deploys-in", "time", type=click.FloatRange(0.0, min_open=True), metavar="SECONDS",
-    help="Find the initial opening angle from which the scene deploys in this time (frame engine).",
+    help="Find the initial opening angle with which the ring deploys in this time (frame engine).",
 )  # fmt: skip
 @click.option(
     "--margin", is_flag=True,
-    help="Tell what drives and what resists at every opening angle, and the margin by standards.",
+    help=
+        "Print driving and resisting forces at each opening angle, and the drive margin by "
+        "standards.",
 )  # fmt: skip
 def check_command(scene: str, settings: dict[str, Any], time: float | None, margin: bool) -> None:
     """Check FILE (a scene file, or the name of a built-in scene) without running it.
@@ -238,7 +240,7 @@ def _shortened(value: Any) -> str:
     if isinstance(value, (list, tuple)) and len(value) > _MOST_LISTED:
         if all(isinstance(each, (int, float)) for each in value):
             return f"{len(value)} values from {min(value):g} to {max(value):g}"
-        return f"{len(value)} values"
+        return counted(len(value), "value")
     if isinstance(value, float):  # from degrees and back again: 19.999999999999996
         return show(float(f"{value:.12g}"))
     return show(value)
@@ -332,17 +334,17 @@ def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
     for number, fault in enumerate(scene.faults, 1):
         words = drive.conditions.told(fault)
         if fault.time > AT_ONCE and words == "counted":
-            words = "strikes later, not counted here; a run counts it from then on"
+            words = "strikes later, not included here; a run includes it from then on"
         yield f"faults[{number}], {kind_of(fault)} at {fault.time:g} s: {words}"
     for where, winch in drive.conditions.winches.items():
         place = place_of_winch(scene, *where)
         if not turns_ever(winch):
-            yield f"{place}: never turns, not counted"
+            yield f"{place}: never turns, not included"
             continue
         if winch.start_time > drive.conditions.begin:
-            yield f"{place}: starts at {winch.start_time:g} s, not counted here"
+            yield f"{place}: starts at {winch.start_time:g} s, not included here"
         if winch.stop_time is not None:
-            yield f"{place}: stops at {winch.stop_time:g} s; a run counts it until then"
+            yield f"{place}: stops at {winch.stop_time:g} s; a run includes it until then"
 
 
 def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
@@ -352,7 +354,7 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
         return
     struck = any(hasattr(one, "cable") and one.time <= AT_ONCE for one in scene.faults)
     if cables.upper == cables.lower and not struck:
-        yield "both planes drive alike: each gives half of the drive"
+        yield "both planes are equal: each gives half of the drive"
         return
     for number, plane in enumerate(scene.structure.planes):
         drive = PlaneMargin(scene, standard, number)
@@ -391,7 +393,7 @@ def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
 @click.argument("names", metavar="[NAME]...", nargs=-1, shell_complete=_names)
 @click.option("--schema", metavar="scene|campaign", help="Print the JSON Schema of such files.")
 def explain_command(names: tuple[str, ...], schema: str | None) -> None:
-    """Say what the variables of a result, or the keys of a scene or campaign file, mean.
+    """Explain the variables of a result, or the keys of a scene or campaign file.
 
     NAME is a variable (asynchrony_max), the path of a key (cables.upper.winch, solver.step,
     design), or one of the words scene and campaign for all keys of such files.  Without a name all
@@ -433,5 +435,7 @@ def _print_schema(kind: str, names: tuple[str, ...]) -> None:
     from ringsim.reference.schema import schema_of
 
     if names:
-        raise InputError(f"--schema {kind}: says nothing of {names[0]}: give one of both")
+        raise InputError(
+            f"--schema {kind}: cannot be combined with {names[0]}: give one of the two"
+        )
     click.echo(json.dumps(schema_of(kind), indent=2))

@@ -13,6 +13,7 @@ from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import write_text
 from ringsim.scene import load_scene
+from ringsim.tables import counted
 
 
 @click.command()
@@ -22,23 +23,26 @@ from ringsim.scene import load_scene
 @click.option("--workers", metavar="N", type=WORKERS, help="Solver processes (default: all cores).")
 @click.option(
     "--timeout", metavar="SECONDS", type=click.FloatRange(0.0, min_open=True), default=1800.0,
-    show_default=True, help="Longest time of one setting.",
+    show_default=True, help="Time limit for each setting.",
 )  # fmt: skip
 @click.option(
     "--most-elements", type=click.Choice(["4", "8"]), default="4", show_default=True,
-    help="Elements up to so many times the scene's; 8 for peak stresses to 1e-3, at several times "
-    "the cost.",
+    help=
+        "Largest number of elements, as a multiple of the scene's; 8 gives peak stresses to 1e-3 "
+        "at several times the cost.",
 )  # fmt: skip
 @click.option(
     "--brief", is_flag=True,
-    help="A quarter of the cost: steps down to a quarter of the scene's instead of a sixteenth, "
-    "elements up to twice the scene's, no constant steps, other rods, dissipation or Newton "
-    "tolerances.",
+    help=
+        "A shorter study (a quarter of the cost): steps down to a quarter instead of a sixteenth "
+        "of the scene's, at most twice its elements; constant steps, rods, dissipation and "
+        "Newton tolerance are not varied.",
 )  # fmt: skip
 @click.option(
     "--fidelity", type=click.Choice(["both", "frame"]), default="both", show_default=True,
-    help="Engines to try; frame: that one alone, at a tenth of the cost, with its own limit as the "
-    "reference.",
+    help=
+        "Engines to compare; frame: only that engine, at a tenth of the cost, with its own limit "
+        "as reference.",
 )  # fmt: skip
 def accuracy_command(
     scene: str, settings: dict[str, Any], out: Path | None, workers: int | None, timeout: float,
@@ -54,7 +58,7 @@ def accuracy_command(
     chosen = load_scene(scene).with_values(settings)
     folder = out or Path("runs") / f"accuracy-{chosen.name}"
 
-    from ringsim.analysis.accuracy import tables
+    from ringsim.analysis.accuracy import lines, tables
     from ringsim.analysis.study import evidence_of
     from ringsim.campaign.studies import ReferenceRunError, run_ladder
     from ringsim.dataset import save
@@ -73,11 +77,11 @@ def accuracy_command(
     title = f"Error against run time: {chosen.name}"
     found.attrs |= {"title": title, "scene": chosen.to_toml()}
     save(found, folder / "accuracy.nc")
-    text = tables(found, title)
-    write_text(folder / "accuracy.md", text)
+    write_text(folder / "accuracy.md", tables(found, title))
     write_text(folder / "settings.toml", tomli_w.dumps(evidence_of(found).model_dump()))
     write(accuracy(found), folder / "accuracy.png")
-    click.echo(text)
+    for line in lines(found, title):
+        click.echo(line)
     for name in ("accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"):
         click.echo(f"wrote {folder / name}")
     return EXIT_DONE
@@ -88,8 +92,9 @@ def accuracy_command(
 @SETTINGS
 @click.option(
     "--over", metavar="PATH=LOW..HIGH", multiple=True,
-    help="Axis of a panel; every two make one (x, then y). cables.*.NAME is that of all cables. "
-    "Default: panels chosen from what the scene holds.",
+    help=
+        "Axis of a panel; each two give one panel (x, then y). cables.*.NAME is NAME of all "
+        "cables. Default: panels that suit the scene.",
 )  # fmt: skip
 @click.option(
     "--points", metavar="N", type=click.IntRange(2, 30), default=5, show_default=True,
@@ -97,7 +102,7 @@ def accuracy_command(
 )  # fmt: skip
 @click.option(
     "--out", metavar="DIR", type=PATH,
-    help="Folder for the map and its campaigns (default runs/stability-SCENE).",
+    help="Folder of the results (default runs/stability-SCENE).",
 )  # fmt: skip
 @click.option(
     "--workers", metavar="N", type=WORKERS, default=1, show_default=True, help="Solver processes."
@@ -105,12 +110,13 @@ def accuracy_command(
 @click.option(
     "--check", "percent", metavar="PERCENT", type=click.FloatRange(0.0, 100.0, min_open=True),
     default=10.0, show_default=True,
-    help="Share of the ok cells that are run again with smaller steps.",
+    help="Percentage of the ok cells that are run again with smaller steps.",
 )  # fmt: skip
 @click.option(
     "--fidelity", type=click.Choice(["full", "frame", "both"]), default="full", show_default=True,
-    help="Engine of the runs; both: side by side, with their error bars and a mark on cells in "
-    "which they differ.",
+    help=
+        "Engine of the runs; both: side by side with error bars, and cells marked where they "
+        "differ.",
 )  # fmt: skip
 def stability_command(
     scene: str, settings: dict[str, Any], over: tuple[str, ...], points: int, out: Path | None,
@@ -128,7 +134,7 @@ def stability_command(
     panels = by_engines(panels_over(chosen, over, points), fidelity)
     for panel in panels:
         x, y = (f"--over {s.label}={s.values[0]:g}..{s.values[-1]:g}" for s in (panel.x, panel.y))
-        click.echo(f"{panel.title}: {x} {y}: {len(list(panel.cells()))} cells")
+        click.echo(f"{panel.title}: {x} {y}: {counted(len(list(panel.cells())), 'cell')}")
     return draw_map(out or Path("runs") / f"stability-{chosen.name}", panels, workers, percent)
 
 

@@ -114,8 +114,8 @@ class Chain:
         if not drums.natural.min() > 0.0:
             short = int(np.argmin(drums.natural))
             raise ValueError(
-                f"cable {ropes.cable[short] + 1}: {-drums.natural[short]:.4g} m more is wound than "
-                "there is rope (limit its winding law, or stop the winch)"
+                f"cable {ropes.cable[short] + 1}: {-drums.natural[short]:.4g} m more is wound "
+                "than there is rope (limit the winding law, or give the winch a stop_time)"
             )
         slide(table, drums, spans)
         log_decays = np.zeros(len(ropes.behind))

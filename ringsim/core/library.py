@@ -103,10 +103,10 @@ def _library() -> ctypes.PyDLL:
             found.compiled_from.restype = ctypes.c_char_p
             if found.compiled_from().decode() == _digest():
                 return found
-            whys.append("was compiled of other sources")
+            whys.append("was compiled from other sources")
     raise NotBuiltError(
-        f"{_FOLDER}: the core of ringsim {whys[-1]}: install it (pip install .), or, to work on "
-        "its sources, pip install -e . after each change of them"
+        f"{_FOLDER}: the compiled core of ringsim {whys[-1]}: run pip install . (developers: pip "
+        "install -e . after each change of the C sources)"
     )
 
 

@@ -59,8 +59,8 @@ def mpi_world() -> Any:
         from mpi4py import MPI
     except (ImportError, RuntimeError) as error:
         raise InputError(
-            f"started {expected} times by a launcher, but MPI cannot be loaded ({error}): install "
-            "an MPI library (pip install 'ringsim[mpich]'), or use --workers instead"
+            f"the launcher has started {expected} processes, but MPI cannot be loaded ({error}): "
+            "install an MPI library (pip install 'ringsim[mpich]'), or use --workers instead"
         ) from None
     world = MPI.COMM_WORLD
     if world.Get_size() != expected:
@@ -71,9 +71,9 @@ def mpi_world() -> Any:
 def _stranger(expected: int, library: str) -> InputError:
     name = library.splitlines()[0].strip(" \0")
     return InputError(
-        f"the launcher has started {expected} processes, but each is alone in its MPI world: the "
-        f"launcher belongs to another MPI than the one loaded ({name}); use that one's mpiexec "
-        "(under Slurm: srun --mpi=pmi2)"
+        f"the launcher has started {expected} processes, but they do not see each other: the "
+        f"launcher belongs to another MPI library than the one loaded ({name}); use the mpiexec "
+        "of that library (under Slurm: srun --mpi=pmi2)"
     )
 
 

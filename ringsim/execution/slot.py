@@ -84,8 +84,8 @@ class SolverProcess:
             other.close()
             shutil.rmtree(scratch, ignore_errors=True)
             raise InputError(
-                f"the solver process cannot be started: {error}; use fewer workers, or make "
-                f"room in {tempfile.gettempdir()} (TMPDIR)"
+                f"the solver process cannot be started: {error}; use fewer workers, or free some "
+                f"space in {tempfile.gettempdir()} (TMPDIR)"
             ) from error
         self._scratch, self.pid = Path(scratch), self._process.pid
         self.send(setup)
@@ -190,7 +190,7 @@ class Slot:
             _require_started(process)
             process.tell_where_it_is()
             limit = f"limits.timeout = {self._allowance.timeout:g} s"
-            why = f"still running after {limit}: raise it, or raise solver.tolerance"
+            why = f"still running after {limit}: raise this limit, or raise solver.tolerance"
             return self._give_up(process, Status.TIMEOUT, why)
         if process.memory() > self._allowance.memory:
             return self._give_up(process, Status.MEMORY)
@@ -247,9 +247,13 @@ class Slot:
         if "bad_alloc" in process.printed():
             return self._give_up(process, Status.MEMORY)
         if code == -signal.SIGALRM:
-            why = "still running long after limits.timeout"
+            why = "did not stop at limits.timeout"
             return self._give_up(process, Status.TIMEOUT, why)
-        how = f"died of {signal.Signals(-code).name}" if code < 0 else f"left with exit code {code}"
+        how = (
+            f"died of {signal.Signals(-code).name}"
+            if code < 0
+            else (f"ended with exit code {code}")
+        )
         return self._give_up(process, Status.CRASHED, f"the solver process {how}")
 
     def _give_up(self, process: SolverProcess, status: Status, reason: str = "") -> Result:

@@ -179,8 +179,8 @@ class EnergyMeter:
     def note(self) -> str:
         """What a run's reason must add about its balance; empty if it is known."""
         unknown = (
-            "; the energy balance is unknown, since slope-vector rods do not tell what their "
-            "damping takes: set rods.damping = 0 to have it"
+            "; the energy balance is unknown, since exudyn does not give the damping energy of "
+            "ancf rods: set rods.damping = 0 to have it"
         )
         return unknown if self._untold else ""
 

@@ -80,7 +80,7 @@ class Ancf:
 
     def add_node(self, assembly: Assembly, pose: Pose, natural: Pose | None) -> Any:
         """A node with position and the slope vectors along y and z."""
-        assert natural is None, "rods of this kind are as long as drawn"
+        assert natural is None, "rods of this kind cannot have a length error"
         y, z = pose.axes[:, 1], pose.axes[:, 2]
         return assembly.add_node(
             item.NodePointSlope23(referenceCoordinates=[*pose.place, *y, *z]),

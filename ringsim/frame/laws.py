@@ -56,7 +56,9 @@ class Row(NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: Any, method: str, *given: Any, **options: Any) -> Any:
         """What numpy calls for its element-wise functions."""
         if method != "__call__" or options:
-            raise TypeError(f"it calls numpy.{ufunc.__name__} otherwise than on numbers alone")
+            raise TypeError(
+                f"it calls numpy.{ufunc.__name__} with other arguments than plain numbers"
+            )
         return self._notes.do(ufunc, given)
 
     def __array_function__(self, function: Any, _: Any, given: Any, options: Any) -> Any:
@@ -71,7 +73,9 @@ class Row(NDArrayOperatorsMixin):
 
     def __bool__(self) -> bool:
         """Refused: a tape has one way through a law."""
-        raise TypeError("it branches on a number, instead of numpy.where")
+        raise TypeError(
+            "it branches on a value (if, and, or, min, max): use a smooth function, or numpy.where"
+        )
 
 
 class _Notes:
@@ -122,7 +126,7 @@ def taped(laws: Sequence[tuple[Law, tuple[int, ...], object]], inputs: int, resu
             found = law(*notes.given)
             told = found if isinstance(found, tuple) else (found,)
             if len(told) != results:
-                raise TypeError(f"it tells {len(told)} things, not {results}")
+                raise TypeError(f"it returns {len(told)} values, not {results}")
             for place, each in enumerate(told, inputs):
                 notes.end(each, place)
         except (TypeError, AttributeError, ValueError) as error:

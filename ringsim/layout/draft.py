@@ -206,7 +206,7 @@ def balanced(layout: Layout) -> Layout:
     if not hung or layout.hub is None:
         return layout
     if len(hung) > 1:
-        raise ValueError("net: give all strings to the hub in one law")
+        raise ValueError("net: define all strings to the hub in one law")
     ends = np.array([layout.bodies[body].pose.place for body in hung[0].bodies[:, 1]])
     return replace(layout, hub=layout.hub._replace(place=FreeHub(hung[0]).place(ends)))
 
@@ -298,7 +298,7 @@ class Draft:
         if stretch > _CLOSE * rod.length:
             raise ValueError(
                 f"{name} of section {section + 1} changes its length by {stretch:.3g} m per unit "
-                "of the structure's coordinate: place its ends so that rods keep their lengths"
+                "of the structure's coordinate: define its ends so that the rod keeps its length"
             )
         self.rods.append(rod)
         return RodRef(len(self.rods) - 1)
@@ -393,8 +393,8 @@ class Draft:
             laws = part.laws(scene.structure.planes, scene.structure.sections)
             if laws and not all(isinstance(one, JointOpening) for row in openings for one in row):
                 raise InputError(
-                    f"{name}: this structure has no joints that open, which would be held: leave "
-                    f'it out ({name} = "none")'
+                    f"{name}: this structure has no opening joints for it to act on: leave it "
+                    f'out ({name} = "none")'
                 )
             found += laws
         return tuple(found)
@@ -429,8 +429,8 @@ class Draft:
         apart = max(np.abs(there.place - place).max(), np.abs(there.rate - rate_of(at)).max())
         if apart > _CLOSE * size:
             raise ValueError(
-                f"a {what} stands {apart:.3g} m off a part that it belongs to, or leaves it as the "
-                "structure folds: give the place that both parts share"
+                f"a {what} is {apart:.3g} m away from a part that it connects, at some opening "
+                "angle: give the point that both parts share"
             )
         return mount
 
@@ -438,8 +438,8 @@ class Draft:
         """Raise a ValueError if so many planes have no corners for a part."""
         if len(self.corners) < planes:
             raise ValueError(
-                f"{part}: this structure has no corners to hold one in {planes} of its planes: "
-                f'leave it out ({part} = "none")'
+                f"{part}: this structure has no corners for one in {planes} of its planes: leave "
+                f'it out ({part} = "none")'
             )
 
     def _net(self) -> list[PairLaw]:
@@ -472,8 +472,8 @@ class Draft:
         for plane, cable in cables.present():
             if plane not in self.tracks:
                 raise ValueError(
-                    f"cables: this structure has no track for a cable in plane {plane + 1}: leave "
-                    "it out, or give Draft.tracks one"
+                    f"cables: this structure has no cable path in plane {plane + 1}: leave the "
+                    "cable out, or add a path to Draft.tracks"
                 )
             track = self.tracks[plane]
             path = [self._sheave(plane, cable, station) for station in track.stations]

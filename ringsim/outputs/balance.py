@@ -68,8 +68,8 @@ class Ending(Output):
 
     rank = 80
     variables = (
-        Variable("status", (), "1", "whether the numbers of the run hold", "i1", flags=Status),
-        Variable("cause", (), "1", "why the numbers do not hold", "i1", flags=Cause),
+        Variable("status", (), "1", "whether the results of the run are valid", "i1", flags=Status),
+        Variable("cause", (), "1", "why the results are not valid", "i1", flags=Cause),
         Variable("outcome", (), "1", "what the antenna did", "i1", flags=Fate),
     )
 

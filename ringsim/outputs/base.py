@@ -127,8 +127,8 @@ def unresolved(run: Run) -> str:
         return ""
     return (
         f"; steps of {1e3 * longest[k]:.3g} ms at the lock at {locks[k]:.6g} s are too long for "
-        f"shocks in the rods (period {1e3 * period:.3g} ms), so that peaks of base loads and of "
-        f"corner accelerations may come out too low: {_to(run, enough / longest[k])}"
+        f"shocks in the rods (period {1e3 * period:.3g} ms), so peaks of base loads and corner "
+        f"accelerations may be too low: {_to(run, enough / longest[k])}"
     )
 
 

@@ -179,7 +179,7 @@ class DriveMargins(Output):
     variables = (
         Variable(
             "drive_available", ("time",), "N m",
-            "what winches that stall, loads and springs drive without friction in the pulleys",
+            "driving moment of stalling winches, loads and springs without friction in the pulleys",
             until=LAST_LOCK,
         ),
         Variable(

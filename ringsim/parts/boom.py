@@ -104,8 +104,8 @@ class Spacecraft(Model):
         """Raise a ValueError where a scene has nothing that a spacecraft could carry."""
         if scene.boom is None:
             raise ValueError(
-                "spacecraft needs a boom, whose upper end it holds: add [boom], or leave the "
-                "spacecraft out"
+                "spacecraft needs a boom, whose upper end it is fixed to: add [boom], or leave "
+                "the spacecraft out"
             )
         if scene.boom.base != "free":
             raise ValueError(

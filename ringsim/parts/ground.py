@@ -58,11 +58,12 @@ class Gravity(Model):
             if scene.spacecraft is not None:
                 raise ValueError(
                     f"{where} with a spacecraft: the structure would fall: leave gravity out; or "
-                    'leave [spacecraft] out and hold it (boom.base = "fixed") or give [offload]'
+                    'leave [spacecraft] out and fix the structure (boom.base = "fixed") or '
+                    "suspend it ([offload])"
                 )
             raise ValueError(
-                f"{where}: the structure would fall: hold it "
-                '(boom.base = "fixed"), hang it up ([offload]), or leave gravity out'
+                f'{where}: the structure would fall: fix it (boom.base = "fixed"), suspend it '
+                "([offload]), or leave gravity out"
             )
         if scene.spacecraft is not None:
             raise ValueError(
@@ -72,10 +73,10 @@ class Gravity(Model):
         residual = scene.offload.mean_residual  # of values that sum to zero round-off is left
         if abs(residual) > 1e-12 and scene.offload.stiffness == 0.0:
             raise ValueError(
-                f"offload.residual = {residual:g} (mean) on a free base: lines of constant force "
-                "leave that share of the weight to nothing, and the structure would "
-                f"{'fall' if residual > 0.0 else 'rise'}: give offload.stiffness, a mean residual "
-                'of 0, or hold the base (boom.base = "fixed")'
+                f"offload.residual = {residual:g} (mean) on a free base: nothing carries the "
+                "rest of the weight, and the structure would "
+                f"{'fall' if residual > 0.0 else 'rise'}: give offload.stiffness, a mean "
+                'residual of 0, or hold the base (boom.base = "fixed")'
             )
 
 
@@ -151,8 +152,8 @@ class Offload(Model):
         """Raise a ValueError where there is no weight, or no such corner."""
         if scene.gravity is None:
             raise ValueError(
-                "offload carries the weight of a structure, and there is none: add [gravity], or "
-                "leave offload out"
+                "offload compensates gravity, and the scene has none: add [gravity], or leave "
+                "offload out"
             )
         count = scene.structure.sections + (0 if scene.structure.closed else 1)
         for k, corner in enumerate(self.corners, 1):

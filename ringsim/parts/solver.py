@@ -59,8 +59,8 @@ class Solver(Model):
     """How often a run that failed or diverged starts anew, each time with a quarter of the step
     and a sixteenth of the tolerance."""
     error_bars: bool = False
-    """Run the scene a second time with steps half as long, and state what the main numbers may
-    be wrong by."""
+    """Run the scene a second time with steps half as long, and give error bars of the main
+    outputs."""
 
     @model_validator(mode="after")
     def _usable(self) -> Self:

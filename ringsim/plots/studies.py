@@ -78,7 +78,7 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
     best = found.isel(rung=found.frontier.values & (error > 0.0)).sortby("cost")
     axes.step(
         best.cost, best.bound, where="post", color=style.INK, linewidth=1.1,
-        label="frontier: good for", zorder=2,
+        label="most accurate for their cost", zorder=2,
     )  # fmt: skip
     floor, known = float(found.uncertainty), error[drawn]
     if known.size or floor > 0.0:
@@ -98,7 +98,7 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
 # The stability map: a panel for each pair of axes, a square for each cell.
 
 
-_AGAIN = "ok, after a new start"
+_AGAIN = "ok, after a restart"
 _CELLS: dict[str, tuple[str, str]] = {
     OK: ("#cfe6f5", ""),
     _AGAIN: (style.SKY, "r"),

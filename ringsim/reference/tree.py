@@ -117,7 +117,7 @@ def known(path: str, others: list[str]) -> list[Found]:
         "ringsim explain lists the variables, ringsim explain scene and campaign the keys"
     )  # fmt: skip
     raise InputError(
-        f"{path}: no key of a scene or a campaign, and no variable of a result ({hint})"
+        f"{path}: neither a key of a scene or campaign nor a variable of a result ({hint})"
     )
 
 

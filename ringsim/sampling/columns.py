@@ -211,8 +211,8 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
         lower = np.linalg.cholesky(matrix[np.ix_(moved, moved)])
     except np.linalg.LinAlgError:
         raise InputError(
-            "correlations: the coefficients contradict each other (their matrix is not positive "
-            "definite): bring them nearer to 0"
+            "correlations: the coefficients are not compatible (their matrix is not positive "
+            "definite): bring them closer to 0"
         ) from None
     dependent = points.copy()
     dependent[:, moved] = inside(

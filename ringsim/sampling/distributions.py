@@ -320,8 +320,9 @@ class Truncated(Distribution):
         below, above = self._ends()
         if above - below < LEAST_MASS:
             raise ValueError(
-                f"low = {self.low}, high = {self.high} keep a probability of {above - below:.1e} "
-                f"only, must be at least {LEAST_MASS:g}: widen the bounds or move the mean"
+                f"low = {self.low}, high = {self.high} keep only a probability of "
+                f"{above - below:.1e}, must be at least {LEAST_MASS:g}: widen the bounds or move "
+                "the mean"
             )
         return self
 

@@ -88,10 +88,10 @@ def draw(
     for column in columns:
         if column.name in taken:
             where = column.path or f"label {column.name}"
-            raise InputError(f"inputs: {where} would be named {column.name}, which is taken")
+            raise InputError(f"inputs: {where} would have the name {column.name}, which is in use")
         if lost := first_inside(column.path, before):
             raise InputError(
-                f"inputs: {column.path} would replace what {lost} has: put it before that"
+                f"inputs: {column.path} would overwrite {lost}: put it before that input"
             )
         taken.add(column.name)
         before.append(column.path)
@@ -122,8 +122,8 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{path} has {count}" for path, count in counts.items())
         raise InputError(
-            f"inputs: {name} is one value for each place of lists that differ in length: {told}: "
-            "leave out each_section, or give each path an input of its own"
+            f"inputs: {name} gives one value for each section, but its lists differ in length: "
+            f"{told}: leave out each_section, or give each path an input of its own"
         )
     return [f"[{k + 1}]" for k in range(min(counts.values()))]
 
@@ -138,13 +138,13 @@ def refuse_fixed(scene: Scene, path: str) -> None:
     for fixed in (*FIXED, *scene.structure.shaping):
         if fixed.startswith(f"{path}."):
             raise InputError(
-                f"inputs: {path} cannot be drawn as a whole, because {fixed} shapes the result: "
-                f"draw the values in it by their own paths, {path}.NAME"
+                f"inputs: {path} cannot be drawn as a whole, because {fixed} in it changes the "
+                f"size of the result: draw its values one by one, as {path}.NAME"
             )
         if path == fixed or path.startswith((f"{fixed}.", f"{fixed}[")):
             raise InputError(
-                f"inputs: {path} must be the same for all samples, because it shapes the result: "
-                "give it under [set], and run a campaign for each value"
+                f"inputs: {path} must be the same for all samples, because it changes the size "
+                "of the result: give it under [set], and run a campaign for each value"
             )
 
 
@@ -213,7 +213,7 @@ def _check_extremes(base: Scene, table: Table, design: Design) -> None:
             raise InputError(f"{design.where(sample, path)}: {told}; {design.cure}") from None
     if len(spans) > 1:
         raise InputError(
-            f"inputs: cables of {min(spans)} and of {max(spans)} spans would not fit into one "
-            'result, and end = "both" has a span more: draw only from "first" and "last", or '
-            "run a campaign for each"
+            f"inputs: cables of {min(spans)} and of {max(spans)} spans cannot be in one result "
+            '(end = "both" has one span more): draw only from "first" and "last", or run a '
+            "campaign for each"
         )

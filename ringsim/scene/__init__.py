@@ -40,10 +40,10 @@ class Scene(Model):
     """A structure with its loads and how to solve it.  Parts left out are not built."""
 
     gone: ClassVar[dict[str, str]] = {
-        "fidelity": "it belongs to a campaign file, or behind --fidelity",
-        "samples": "a campaign has samples: ringsim campaign FILE --samples N",
-        "inputs": "it belongs to a campaign file",
-        "requirements": "it belongs to a campaign file",
+        "fidelity": "this key is for campaign files; for a run use --fidelity",
+        "samples": "this is for campaigns: ringsim campaign FILE --samples N",
+        "inputs": "this key is for campaign files",
+        "requirements": "this key is for campaign files",
     }
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
@@ -106,13 +106,14 @@ class Scene(Model):
                 part.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods) and self.rods.damping > 0.0:
             raise ValueError(
-                f'record.stress = true with rods.kind = "ancf" needs rods.damping = 0, not '
-                f"{self.rods.damping:g} s: exudyn does not tell what damping carries in these rods"
+                'record.stress = true with rods.kind = "ancf" needs rods.damping = 0, not '
+                f"{self.rods.damping:g} s: exudyn does not give the damping part of the stress "
+                "in these rods"
             )
         if self.record.interval > self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must not exceed solver.end_time = "
-                f"{self.solver.end_time} s: nothing but the start would be recorded"
+                f"{self.solver.end_time} s: only the start would be recorded"
             )
         if self.record.interval * MOST_RECORDS < self.solver.end_time:
             raise ValueError(
@@ -235,8 +236,8 @@ def _refuse_renumbering(
     if at_path(table, path) != value and (listed or placed):
         what = own if listed else "faults"
         raise InputError(
-            f"{path} = {show(value)}: pulleys count from the winch, so that those of {what} would "
-            f"be others: give {what} anew, too"
+            f"{path} = {show(value)}: pulleys are numbered from the winch, so the values of "
+            f"{what} would move to other pulleys: give {what} again, too"
         )
 
 

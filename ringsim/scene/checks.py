@@ -50,17 +50,19 @@ def _check_margin(scene: "Scene") -> None:
     if scene.margin is None:
         return
     if scene.cables is None and scene.loads is None and scene.hinge_spring is None:
-        raise ValueError("margin: nothing drives the ring (add [cables.upper], or leave it out)")
+        raise ValueError(
+            "margin: nothing drives the ring (add [cables.upper], or leave margin out)"
+        )
     if scene.loads is not None and scene.loads.reversal_time is not None:
         raise ValueError(
-            f"margin: loads.reversal_time = {scene.loads.reversal_time:g} s: a margin is told of "
-            "loads that keep their sign: leave one of them out"
+            f"margin: loads.reversal_time = {scene.loads.reversal_time:g} s: a margin needs "
+            "loads of constant sign: leave one of the two out"
         )
     if reason := why_unlimited(scene.cables, scene.structure.planes):
         raise ValueError(reason)
 
 
-_NO_SUCH = "no such parts, or none that it shifts"
+_NO_SUCH = "no such parts"
 
 
 def check_layout(scene: "Scene") -> None:

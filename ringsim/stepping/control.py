@@ -194,9 +194,8 @@ class RunControl(Remembering):
         """End a run whose solver gave up, for this cause."""
         self._give_up(
             Cause.NEWTON,
-            f"the solver gave up at {self.now.time:.6g} s after {self.repeats} reductions of the "
-            "step: reduce solver.step or solver.tolerance, or raise solver.newton_tolerance "
-            f"({cause})",
+            f"the solver stopped at {self.now.time:.6g} s after {self.repeats} step reductions: "
+            f"reduce solver.step or solver.tolerance, or raise solver.newton_tolerance ({cause})",
         )
 
     def diverge(self, reason: Reason) -> None:
@@ -333,7 +332,7 @@ class RunControl(Remembering):
         """End a run early; one that has reached its goal only settles less."""
         self.goes_on = False
         if math.isfinite(self._settled_at):
-            self.reason += f"; settling was cut short at {self.now.time:.6g} s"
+            self.reason += f"; settling was stopped early at {self.now.time:.6g} s"
         else:
             self.status, self.reason = Status.SOLVER_FAILED, Reason(cause, words)
 
@@ -369,15 +368,15 @@ def go_on(control: RunControl, solver: Solver, memory: Memory, changed: bool, wh
         words = "come to the stowed stop" if folded else "locked"
         cure = "change the loads (--set), " if folded else ""
         raise InputError(
-            f"{where}: all V-joints had {words} and settled: {cure}take an earlier state (--at), "
-            "or raise solver.settling_time"
+            f"{where}: all V-joints had {words} and settled: {cure}start from an earlier state "
+            "(--at), or raise solver.settling_time"
         )
     if control.goes_on:
         return
     if not changed and control.fate not in _UNFINISHED:
         raise InputError(
-            f"{where}: the run had ended there ({control.reason}) and the scene is the same: take "
-            "an earlier state (--at), or change the scene (--set)"
+            f"{where}: the run ended there ({control.reason}), and the scene is unchanged: start "
+            "from an earlier state (--at), or change the scene (--set)"
         )
     control.goes_on = True
     if control.fate not in (Fate.DEPLOYED, Fate.FOLDED):

@@ -92,7 +92,7 @@ def unresolved(run: list[Instant], slack_tension: float | None) -> Reason:
     usual = math.sqrt(float(np.mean(bends**2)))
     there = float(bends[peak - 1]) if 0 < peak < len(times) - 1 else 0.0
     for bend, share, where in (
-        (usual, BEND, "in the root mean square"),
+        (usual, BEND, "(root mean square)"),
         (there, PEAK_BEND, f"at {times[peak]:.6g} s, where it is largest"),
     ):
         if bend > max(share * largest, slack_tension):
@@ -100,7 +100,7 @@ def unresolved(run: list[Instant], slack_tension: float | None) -> Reason:
                 Cause.TENSION_BENDS,
                 f"a tension bends by {bend:.3g} N within a step {where}, "
                 f"{100.0 * bend / largest:.3g} % of its largest value and more than "
-                f"{100.0 * share:g} %: the steps do not resolve how the rope swings: "
+                f"{100.0 * share:g} %: the steps do not resolve the vibration of the rope: "
                 "reduce solver.step",
             )
     return Reason()
@@ -150,9 +150,9 @@ class Guard(Remembering):
         if first and abs(stored - left) > SLIGHT * (self._scales.energy + left):
             return Reason(
                 Cause.STRAINED,
-                f"rods and boom store {stored:.3g} J at the start, where putting them together has "
-                f"left {left:.3g} J: this model does not start where it was assembled, and what it "
-                "would tell is wrong (choose another fidelity, and report the scene)",
+                f"rods and boom store {stored:.3g} J at the start, but {left:.3g} J after "
+                "assembly: the model does not start from its assembled state, and results would "
+                "be wrong (choose another fidelity, and report this scene)",
             )
         time, found, start = now.time, now.energies, self._run[0].energies
         if not first:  # what a fault takes at the start is not in it any more

@@ -136,8 +136,8 @@ class EnergyImbalance(Indicator):
         if self._refused < self._patience:
             return ""
         return (
-            f"; energy repeated a step {self._refused} times and was left alone after that: see "
-            "energy_error"
+            f"; steps repeated to keep the energy balance: {self._refused}, further ones were "
+            "accepted as they were: see energy_error"
         )
 
     def _exchange(self, first: Energies, last: Energies) -> float:

@@ -225,8 +225,8 @@ class Survey:
                     if (result := _read_record(file, int(place))) is None:
                         forget(self.journals[number].parents[1])
                         raise DamagedError(
-                            f"{self.journals[number]} has been damaged meanwhile: give the same "
-                            "command again"
+                            f"{self.journals[number]} was damaged while it was read: run the "
+                            "same command again"
                         )
                     yield result
 
@@ -248,7 +248,7 @@ def survey(folder: Path, run_with: Sequence[str], *, checks: bool = False) -> Su
         remember(folder, known)
     for name, found in known.items():
         if found.damaged:
-            told = "%s is damaged: %d of its records cannot be used, their samples run again"
+            told = "%s is damaged: %d of its results cannot be read, and their samples run again"
             _log.warning(told, name, found.damaged)
     records = np.concatenate([np.empty(0, RECORD), *(each.records for each in known.values())])
     counts = np.array([len(each.records) for each in known.values()], dtype=np.int64)

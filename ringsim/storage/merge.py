@@ -25,8 +25,8 @@ _OF_SAMPLES = ("log", "overrides", "attempts")
 """What is not told of checks."""
 BLOCK_BYTES = 64 << 20
 UNFIT = (
-    "its output times or places differ from those of the first samples: do not vary what shapes "
-    "the result"
+    "its result has another size than those of the first samples: do not vary inputs that change "
+    "the size of the result"
 )
 """Reason of samples that cannot stand in one file with the others."""
 

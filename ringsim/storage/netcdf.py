@@ -40,9 +40,9 @@ CHUNK_BYTES = 1 << 20
 
 PER_SAMPLE = {name: VARIABLES[name] for name in ("status", "cause")} | {
     "reason": Variable("reason", (), "1", "why the run ended so", "str"),
-    "log": Variable("log", (), "1", "end of what a failed run printed", "str"),
+    "log": Variable("log", (), "1", "last lines of output of a failed run", "str"),
     "overrides": Variable("overrides", (), "1", "settings given for this sample alone", "str"),
-    "attempts": Variable("attempts", (), "1", "results on file, failures too", "i4"),
+    "attempts": Variable("attempts", (), "1", "stored results, failed runs included", "i4"),
 }
 """What is known of every sample beside its outputs."""
 
@@ -51,7 +51,7 @@ class OutputTable(Model):
     """How ``campaign.nc`` stores the results."""
 
     gone: ClassVar[dict[str, str]] = {
-        "shard_samples": "results are kept in journals of any length; leave it out",
+        "shard_samples": "there is no limit any more: leave it out",
     }
 
     compression: Annotated[int, Field(ge=0, le=9)] = 4
@@ -147,8 +147,8 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
     if not path.is_file():
         what = "this is a file" if folder.exists() else "there is no such folder"
         if folder.is_dir():
-            what = f"no campaign in this folder: {DESIGN} is not there"
-        raise InputError(f"{folder}: {what}: give the folder that ringsim campaign named")
+            what = f"no campaign in this folder: it has no {DESIGN}"
+        raise InputError(f"{folder}: {what}: give the folder that ringsim campaign has written")
     try:
         with netCDF4.Dataset(path) as file:
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
@@ -187,8 +187,8 @@ def provenance(*, name: str, title: str, action: str, model: Fidelity) -> dict[s
 
 
 GO_ON = (
-    "make room or choose another folder, then give the same command again: finished samples are "
-    "kept"
+    "free some space or choose another folder, then run the same command again: finished samples "
+    "are kept"
 )
 """What to do when a campaign's folder cannot be written to."""
 
@@ -204,7 +204,7 @@ def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[
     """
     if path.is_symlink() or (path.exists() and not path.is_file()):
         what = "a link" if path.is_symlink() else "a folder" if path.is_dir() else "no file"
-        raise InputError(f"{path}: is {what}, where a lock of the campaign should be: remove it")
+        raise InputError(f"{path}: is {what}, but must be a lock file of the campaign: remove it")
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
     except OSError:
@@ -246,8 +246,8 @@ def tries(folder: Path) -> Iterator[int]:
         yield number
         time.sleep(_LOCK_PAUSE)
     raise InputError(
-        f"{folder}: another process runs this campaign just now: wait for it, or stop it (ringsim "
-        "status tells which it is)"
+        f"{folder}: another process is running this campaign: wait for it, or stop it (ringsim "
+        "status shows which one)"
     )
 
 

@@ -35,7 +35,7 @@ class Result:
     cause: Cause = Cause.NONE
     """The same as a code."""
     log: str = ""
-    """The end of what a failed run printed."""
+    """The last lines of output of a failed run."""
     seconds: float = float("nan")
     """Elapsed time of the run."""
     finished: float = 0.0

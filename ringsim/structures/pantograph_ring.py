@@ -313,8 +313,8 @@ class PantographRing(Structure):
             if self.hinge_offset + np.min(error) < 0.0:
                 raise ValueError(
                     f"hinge_error.{name} = {np.min(error):g} m must be at least "
-                    f"{-self.hinge_offset:g}, the negative of hinge_offset: the pin would stand "
-                    "beyond the line of its hinge assembly, in the next section (raise it)"
+                    f"{-self.hinge_offset:g}, the negative of hinge_offset: the pin would lie "
+                    "beyond its hinge assembly, in the next section (raise it)"
                 )
         if self.closed and self.sections < 3:
             raise ValueError(
@@ -355,7 +355,7 @@ class PantographRing(Structure):
         """See ``Structure``."""
         for rod in ("diagonal", "bar"):
             tube, longest = f"rods.{rod}.outer_diameter", f"structure.half_{rod}"
-            scene.require_below(tube, longest, "a rod is longer than thick")
+            scene.require_below(tube, longest, "a rod must be longer than thick")
         highest = 2.0 * self.half_diagonal
         if scene.boom is not None and scene.boom.length < highest:
             raise ValueError(

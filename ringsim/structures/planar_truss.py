@@ -194,8 +194,8 @@ class PlanarTruss(Structure):
         self.require_below("strut_foot", "axis_length")
         if self.rest_distance >= self.beam_length:
             raise ValueError(
-                f"rest.buffer = {self.rest.buffer} m must leave the beams room to fold: the rest "
-                f"stands {self.rest_distance:.4g} m off the axis"
+                f"rest.buffer = {self.rest.buffer} m must leave room for the folded beams: the "
+                f"rest is {self.rest_distance:.4g} m from the axis"
             )
         geometry, stowed = self.geometry(), self.stowed_angle
         least, most = float(geometry.cable(stowed)), self.axis_length + self.beam_length
@@ -208,8 +208,8 @@ class PlanarTruss(Structure):
         if not shortest >= self.strut_tube_length > 0.5 * longest:
             raise ValueError(
                 f"strut_tube_length = {self.strut_tube_length} m must be above "
-                f"{0.5 * longest:.4g} m and at most {shortest:.4g} m: the tubes would part, or "
-                "meet each other's ends"
+                f"{0.5 * longest:.4g} m and at most {shortest:.4g} m: the tubes would part, "
+                "or hit each other's ends"
             )
         return self
 
@@ -222,9 +222,7 @@ class PlanarTruss(Structure):
         """See ``Structure``: parts of rings are refused, the cable is needed."""
         for name in ("stop", "boom", "spacecraft", "offload", "net", "loads"):
             if getattr(scene, name) is not None:
-                raise ValueError(
-                    f'{name} is a part of rings: leave it out of a planar truss ({name} = "none")'
-                )
+                raise ValueError(f'{name} is for rings only: leave it out ({name} = "none")')
         if scene.joints.model_dump():
             raise ValueError("joints: a planar truss has no joint friction yet: leave it out")
         if scene.faults:

@@ -40,7 +40,7 @@ def test_settings_are_picked_and_told(tmp_path: Path) -> None:
     picked = evidence_for(load_scene("ring18")).pick(0.05)
     step = f"solver.step = {picked.values['solver.step']}"
     assert f"settings for 0.05: fidelity = frame, {step}, solver.tolerance" in found.output
-    assert "measured with ring18 to be good for: deployment time" in found.output
+    assert "errors measured with ring18: deployment time" in found.output
     with xr.open_dataset(out) as dataset:
         assert f"tolerance = {picked.values['solver.tolerance']}" in dataset.attrs["scene"]
         assert dataset.attrs["fidelity"] == "frame"
@@ -68,13 +68,13 @@ def test_the_full_engine_runs_where_the_cheaper_one_cannot_or_may_not(
 @for_each(
     ("words", "told"),
     [
-        (["--accuracy", "1e-7"], "the best setting measured with ring18 is good for"),
+        (["--accuracy", "1e-7"], "the best setting measured with ring18 has an error of"),
         (["--accuracy", "0.05", "--of", "mass"], "--of mass: must be one of motion, loads"),
         (["--accuracy", "0.05", "--of", "peak_tension"], "ring18 has no such output"),
         (["--of", "loads"], "without --accuracy"),
         (["--accuracy", "0.05", "--set", "solver.step_control=constant"], "step_control"),
         (["--accuracy", "0.05", "--fidelity", "both"], "leave out one"),
-        (["--accuracy", "0.05", "--set", "solver.tolerance=1e-3"], "--accuracy chooses it"),
+        (["--accuracy", "0.05", "--set", "solver.tolerance=1e-3"], "--accuracy selects this value"),
         (["--evidence", "none.toml"], "without --accuracy"),
         (["--accuracy", "0.01", "--evidence", "none.toml"], "there is no such file"),
         (["--accuracy", "7"], "--accuracy"),

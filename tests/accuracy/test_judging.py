@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
+
 import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
 from loops import for_each
 
-from ringsim.analysis.accuracy import NEEDED, Truth, in_words, judge, tables
+from ringsim.analysis.accuracy import NEEDED, Truth, in_words, judge, lines, tables
 from ringsim.analysis.ladder import PATHS, Rung, by_frames, ladder, references
 from ringsim.analysis.study import evidence_for, evidence_of, read_evidence
 from ringsim.refusal import InputError
@@ -168,6 +171,17 @@ def test_tables_name_settings_as_overrides(study: xr.Dataset) -> None:
     assert in_words(study, 0) == "as it stands"
 
 
+def test_a_terminal_has_the_same_tables_without_marks_of_markdown(study: xr.Dataset) -> None:
+    told, text = "\n".join(lines(study, "A study")), tables(study, "A study")
+    assert told.startswith("A study\n\nThe cheapest setting for each error.")
+    assert not {"|", "`", "**", "# "} & {each for each in ("|", "`", "**", "# ") if each in told}
+    bold = re.findall(r"\*\*(.*?)\*\*", text)
+    assert len(bold) > 3
+    assert Counter(re.findall(r"(\S+) \*", told)) == Counter(bold) + Counter({"or": 1})
+    assert "peak stress" in told
+    assert "--set solver.tolerance=0.001" in told
+
+
 def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tmp_path) -> None:
     evidence = evidence_of(study)
     file = tmp_path / "settings.toml"
@@ -201,7 +215,7 @@ def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tm
     with pytest.raises(InputError) as told:
         evidence.pick(0.5 * best)
     # What the refusal says to ask for is given.
-    evidence.pick(float(str(told.value).partition("good for ")[2].split()[0]))
+    evidence.pick(float(str(told.value).partition("an error of ")[2].split()[0]))
     with pytest.raises(InputError, match="has no such output: choose from motion, loads"):
         evidence.pick(0.1, "peak_tension")
     with pytest.raises(InputError, match="cables = False"):
@@ -285,7 +299,7 @@ def test_evidence_of_old_is_of_the_full_engine(engines: xr.Dataset, tmp_path) ->
         del setting["fidelity"]
     file.write_text(tomli_w.dumps(old))
     assert {setting.fidelity for setting in read_evidence(file).settings} == {"full"}
-    with pytest.raises(InputError, match="no settings of it were measured with ring18"):
+    with pytest.raises(InputError, match="no settings were measured for this fidelity with ring18"):
         read_evidence(file).pick(1e-2, fidelity="frame")
 
 

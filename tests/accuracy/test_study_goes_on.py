@@ -87,7 +87,7 @@ def test_one_failed_reference_costs_certainty_only(study):
         assert own > whole, failing
         assert error(found) <= float(own), failing
         remarks = found.attrs["remarks"]
-        told = "ended as timeout: took too long; the reference is made of other runs"
+        told = "ended as timeout: took too long; other runs form the reference"
         assert told in remarks, failing
         assert remarks in tables(found, "A study"), failing
 
@@ -135,7 +135,7 @@ def test_frames_alone_are_their_own_reference(study):
     found = study([], fidelity="frame")
     assert set(found.fidelity.values) == {"frame"}
     assert error(found) < 1e-8
-    assert "the reference is its own limit" in tables(found, "A study")
+    assert "the reference is the limit of its own fine steps" in tables(found, "A study")
     with pytest.raises(ReferenceRunError, match="more time"):
         study([rung("steps", "x 1/4")], fidelity="frame")
 

@@ -58,8 +58,8 @@ def test_every_dataset_has_it(order: str, tmp_path: Path) -> None:
 
 def test_outcomes_are_counted_with_exact_intervals(campaign: xr.Dataset) -> None:
     table = campaign.ring.outcomes()
-    assert table["samples"].to_dict() == {"deployed": 5, "stalled": 2, "lost: timeout": 1}
-    assert table["lost"].to_dict() == {"deployed": 1, "stalled": 1, "lost: timeout": 0}
+    assert table["samples"].to_dict() == {"deployed": 5, "stalled": 2, "failed: timeout": 1}
+    assert table["lost"].to_dict() == {"deployed": 1, "stalled": 1, "failed: timeout": 0}
     for kind, row in table.iterrows():
         assert row["of"] == 8
         least, most = int(row["samples"]), int(row["samples"] + row["lost"])

@@ -128,7 +128,7 @@ def test_the_gate_is_closed_while_samples_are_left(tmp_path):
 
 def test_a_gate_needs_requirements(tmp_path):
     campaign(np.arange(20.0)).to_netcdf(tmp_path / "campaign.nc")
-    with pytest.raises(InputError, match="has no requirements to meet: give some"):
+    with pytest.raises(InputError, match="has no requirements: give some"):
         analyse(tmp_path / "campaign.nc", "--gate")
 
 
@@ -144,7 +144,7 @@ def claiming(file, count):
     [
         (lambda folder: None, "no such file or folder"),
         (lambda folder: folder.mkdir(), "no campaign in it"),
-        (lambda folder: (folder.mkdir(), (folder / "design.nc").touch()), "no sample of it has"),
+        (lambda folder: (folder.mkdir(), (folder / "design.nc").touch()), "no sample has"),
         (
             lambda folder: (
                 (folder / "journals").mkdir(parents=True),
@@ -154,10 +154,10 @@ def claiming(file, count):
             "design.nc: cannot be read",
         ),
         (lambda folder: folder.write_text("text"), "cannot be read as a netCDF file"),
-        (lambda folder: xr.Dataset({"status": 0}).to_netcdf(folder), "holds no samples"),
+        (lambda folder: xr.Dataset({"status": 0}).to_netcdf(folder), "not a campaign"),
         (
             lambda folder: campaign(np.arange(9.0), status=[77] * 9).to_netcdf(folder),
-            "status holds 77, which means nothing",
+            "status holds 77, which is not a valid code",
         ),
         (lambda folder: claiming(folder, 10**12), "has 1,000,000,000,000 entries, must be at most"),
     ],
@@ -170,7 +170,7 @@ def test_what_is_no_campaign_is_refused(make, words, tmp_path):
 
 def test_a_campaign_s_file_is_no_result(tmp_path):
     (tmp_path / "study.toml").write_text(CAMPAIGN)
-    with pytest.raises(InputError, match="this says what to run"):
+    with pytest.raises(InputError, match="this is an input file without results"):
         analyse(tmp_path / "study.toml")
 
 

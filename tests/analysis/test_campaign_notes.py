@@ -27,7 +27,9 @@ def test_the_numerical_error_of_a_sample_that_is_named_stands_beside_its_value()
     assert "in sample 4: 24" in line
     assert " N +- 0.25 at 5 s" in line
     (line,) = told([0.1, np.nan, 0.3, np.nan, np.nan])
-    assert line.endswith("; it states no numerical error, the 2 samples that do have 0.3 N at most")
+    assert line.endswith(
+        "; this sample has no error bar, the 2 samples that have one are within 0.3 N"
+    )
     assert "nan" not in line
     assert sum("error_bars_every" in line for line in peak_lines(made)) == 1
 
@@ -46,10 +48,12 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     reasons[11] += "; " + latch.format("upper 2, 4")
     made["reason"] = "sample", np.array(reasons, dtype=object)
     first, second = remark_lines(made)
-    assert first == f"in 3 of 11 samples, as sample 1 tells: {steps.format(2.5, 9.1)}"
-    assert second.startswith("in 3 of 11 samples, as sample 9 tells: whether the latch of upper 3")
+    assert first == f"in 3 of 11 samples, for example in sample 1: {steps.format(2.5, 9.1)}"
+    assert second.startswith(
+        "in 3 of 11 samples, for example in sample 9: whether the latch of upper 3"
+    )
     lines = "\n".join(all_told(analyse(made)))
     assert " ".join(first.split()) in " ".join(lines.split())
     assert remark_lines(made_campaign(3)) == []
     made["reason"] = "sample", np.array([f"{reached}; {latch}"] * 12, dtype=object)
-    assert remark_lines(made) == [f"in all 11 samples, as sample 0 tells: {latch}"]
+    assert remark_lines(made) == [f"in all 11 samples, for example in sample 0: {latch}"]

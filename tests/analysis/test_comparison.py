@@ -123,13 +123,13 @@ def test_outcomes_that_changed_are_told_by_sample():
         seeded(np.full(30, 1.0), outcome=one), seeded(values, outcome=other, status=status)
     )
     assert found.changed_sample_first.values.tolist() == [7, 12]
-    assert found.changed_outcome_second.values.tolist() == ["stalled", "lost: timeout"]
+    assert found.changed_outcome_second.values.tolist() == ["stalled", "failed: timeout"]
     lines = compared(found)
     assert "the outcome differs in 2 of 30" in lines
-    assert ["12", "deployed", "lost:", "timeout"] in [line.split() for line in lines]
+    assert ["12", "deployed", "failed:", "timeout"] in [line.split() for line in lines]
     assert found.asynchrony_max_samples.values.tolist() == [29, 29]
     counts = dict(zip(found.kind.values, found.kind_samples.values.tolist(), strict=True))
-    assert counts == {"deployed": [30, 28], "lost: timeout": [0, 1], "stalled": [0, 1]}
+    assert counts == {"deployed": [30, 28], "failed: timeout": [0, 1], "stalled": [0, 1]}
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_shares_of_outcomes_and_of_requirements_differ_by_an_interval():
     kinds = (kept[0] & kept[1]), (kept[0] & ~kept[1]), (~kept[0] & kept[1]), (~kept[0] & ~kept[1])
     expected = difference_of_pairs(*(int(each.sum()) for each in kinds))
     assert found.kept_share_difference_interval.values == pytest.approx(expected)
-    assert "samples that keep to" in "\n".join(compared(compare(one, two)))
+    assert "samples that meet" in "\n".join(compared(compare(one, two)))
     # Without pairs, and with another limit in one of them.
     found = compare(one, seeded(SHIFTED, 1, outcome=other)).sel(kind="stalled")
     expected = difference_of_shares((0, COUNT), (COUNT // 8, COUNT))

@@ -70,7 +70,7 @@ def test_an_input_is_not_told_for_the_effect_of_one_that_it_goes_with():
     names = [row[1] for row in table.rows]
     assert names[0] == factors[first]
     assert factors[second] not in names
-    (note,) = (note for note in table.notes if note.startswith("inputs are not independent"))
+    (note,) = (note for note in table.notes if note.startswith("these inputs are correlated"))
     assert f"r = {correlation:+.2f}" in note
     assert f"asynchrony_max by {factors[second]}" in table.notes[-1]
     assert note.partition(":")[0] in "".join(told(found, full=True))

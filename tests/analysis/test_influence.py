@@ -47,7 +47,7 @@ def test_one_input_that_decides_the_ranks_is_told_as_the_cause():
     made["peak_tension"][:] = 10.0 + made["a"].to_numpy() ** 3
     notes = [note for table in influence_tables(analyse(made)) for note in table.notes]
     (note,) = (each for each in notes if "no partial correlation" in each)
-    assert "peak_tension (60 samples used: one input decides its ranks)" in note
+    assert "peak_tension (60 samples used: one input determines the ranks)" in note
 
 
 def test_partial_correlations_are_those_of_residuals():
@@ -158,8 +158,8 @@ def test_what_is_left_out_is_counted_and_round_off_has_no_inputs():
     made = campaign(whole, prestress_energy=1e-17 * whole)
     made = with_inputs(made, **{f"loads__force{k}": forces[:, k] for k in range(5)})
     lines = told(analyse(made))
-    further = [line for line in lines if line.startswith("further inputs beyond chance")]
-    assert further == ["further inputs beyond chance, told with --full: asynchrony_max 2"]
+    further = [line for line in lines if line.startswith("further significant inputs")]
+    assert further == ["further significant inputs, listed with --full: asynchrony_max 2"]
     assert not any(line.split()[:1] == ["prestress_energy"] and "loads" in line for line in lines)
 
 
@@ -176,7 +176,7 @@ def test_what_separates_failures_stalls_and_violations_is_found():
     wanted = {"asynchrony_max": {"max": 0.8, "probability": 0.9, "confidence": 0.9}}
     found = analyse(made, wanted)
     areas = found.separation.to_series()
-    assert areas["lost", "force"] == 1.0
+    assert areas["failed runs", "force"] == 1.0
     assert areas["stalled", "force"] == 0.0
     assert areas["stalled", "stop = 3.0"] == 1.0
     assert areas["violates asynchrony_max <= 0.8 degree", "other"] == 1.0

@@ -1,6 +1,6 @@
 """Runs lost where inputs have certain values: verdicts stay safe, and every line they bend says so.
 
-y = 10 x1 + noise with x1 uniform, and 80 % of the runs with x1 > 0.8 are lost: what is left has a
+y = 10 x1 + noise with x1 uniform, and 80 % of the runs with x1 > 0.8 fail: what is left has a
 mean of 4.3 instead of 5, and keeps to limits that a tenth of all antennas violate.
 """
 
@@ -32,7 +32,7 @@ WANTED = {
     "outcome": {"is": "deployed", "probability": 0.9, "confidence": 0.9},
 }
 NARROW = {"x1": {"kind": "uniform", "low": 0.0, "high": 0.9}}
-SAFE = ("lost", "deployed")
+SAFE = ("failed", "deployed")
 """How rows begin that lost runs do not bend: of these runs, and shares that name them."""
 
 
@@ -68,14 +68,14 @@ def test_every_line_that_lost_runs_bend_is_marked(full):
     lines = told(found, full=full)
     assert lines[1] == found.attrs[NOTE]
     assert lines[1].startswith(
-        "66 of 400 runs are lost, and which ones goes with inputs (p < 0.0001)"
+        "66 of 400 runs failed, and whether one fails depends on the inputs (p < 0.0001)"
     )
     rows = rows_of(lines)
     assert len(rows) > 12
     for line in rows:
         assert (MARK in line) != line.startswith(SAFE) or line.startswith("deployed (few) *"), line
     (deployed,) = (line for line in rows if line.startswith("deployed ") and "(few)" not in line)
-    assert "334 of 400 (66 lost)" in deployed
+    assert "334 of 400 (66 failed)" in deployed
 
 
 def test_runs_lost_at_random_bend_nothing_and_are_named():
@@ -84,7 +84,7 @@ def test_runs_lost_at_random_bend_nothing_and_are_named():
     lines = told(found, full=True)
     assert not [line for line in lines if MARK in line]
     (deployed,) = (line for line in lines if line.startswith("deployed"))
-    assert re.search(r"\d+ of 400 \(\d+ lost\)", deployed)
+    assert re.search(r"\d+ of 400 \(\d+ failed\)", deployed)
 
 
 def test_an_analysis_marks_the_variables_and_the_accessor_its_answers():
@@ -127,15 +127,15 @@ def test_the_end_of_a_campaign_says_it_beside_its_verdicts():
     assert len(rows) == 2
     for line in rows:
         assert MARK in line
-    assert any("it would be met if lost samples were as the others" in line for line in others)
+    assert any("without the failed runs it would be met" in line for line in others)
 
 
 def test_a_comparison_names_the_lost_runs_of_either():
     lines = compared(compare(made(1), made(2, by_inputs=False)))
-    (note,) = (line for line in lines if line.startswith("first: 66 of 400 runs are lost"))
+    (note,) = (line for line in lines if line.startswith("first: 66 of 400 runs failed"))
     assert "second: " not in note
     for line in rows_of(lines):
-        assert (MARK in line) != line.startswith("lost"), line
+        assert (MARK in line) != line.startswith("failed"), line
 
 
 ALLOWED = {
@@ -182,9 +182,9 @@ def test_every_row_of_a_report_that_lost_runs_bend_is_marked(bent):
             cells = re.findall(r"<td>(.*?)</td>", row)
             label = cells[0] or label
             seen += 1
-            assert any(cell.endswith(MARK) for cell in cells) != label.startswith("lost"), row
+            assert any(cell.endswith(MARK) for cell in cells) != label.startswith("failed"), row
     assert seen > 8
-    assert "20 of 30 (10 lost)" in text
+    assert "20 of 30 (10 failed)" in text
 
 
 def test_figures_say_it_in_title_and_caption():
@@ -192,6 +192,6 @@ def test_figures_say_it_in_title_and_caption():
     figure = distributions(campaign)
     assert figure.get_suptitle().startswith(f"Distributions{MARK}: ")
     caption = " ".join(figure.get_supxlabel().split())
-    assert "* 10 of 30 runs are lost, and which ones goes with inputs" in caption
+    assert "* 10 of 30 runs failed, and whether one fails depends on the inputs" in caption
     sound = distributions(made_campaign(8))
     assert MARK not in sound.get_suptitle() + sound.get_supxlabel()

@@ -43,11 +43,11 @@ def test_both_ways_of_writing_read_alike():
         ({"peak_tension": SHOWN}, "give max or min, in N"),
         ({"peak_tension": {"maximum": 1.0, **SHOWN}}, r"did you mean max\?"),
         ({"peak_tension": {"max": 1.0, "min": 2.0, **SHOWN}}, "min = 2 must be below max = 1"),
-        ({"peak_tension": {"is": "deployed", **SHOWN}}, "only the outcome is a word"),
+        ({"peak_tension": {"is": "deployed", **SHOWN}}, "only the requirement on outcome takes is"),
         ({"peak_tension": {"max": "much", **SHOWN}}, "must be a finite number"),
         ({"peak_tension": {"max": 1.0, "probability": 1.0, "confidence": 0.9}}, "must be below 1"),
         ({"peak_tension": {"max": 1.0, "probability": 0.9, "confidence": 9}}, "must be below 1"),
-        ({"outcome": {"max": 1.0, **SHOWN}}, 'as is = "deployed"'),
+        ({"outcome": {"max": 1.0, **SHOWN}}, 'for example is = "deployed"'),
         ({"outcome": {"is": "deplyed", **SHOWN}}, r"did you mean deployed\?"),
         ({"peak_tension": 5.0}, "must be a table"),
         ({"outcome": {"is": 3, **SHOWN}}, "must be text in quotes"),
@@ -90,7 +90,7 @@ def test_a_campaign_refuses_what_its_scene_does_not_tell(tmp_path):
         peak_tension = { max = 10.0, probability = 0.99, confidence = 0.9 }
         """
     file.write_text(text)
-    with pytest.raises(InputError, match=r"requirements\.peak_tension: .* it has no cables"):
+    with pytest.raises(InputError, match=r"requirements\.peak_tension: .* the scene has no cables"):
         load_campaign(file)
     file.write_text(text.replace("peak_tension", "asynchrony_max"))
     assert load_campaign(file).specification.requirements["asynchrony_max"].max == 10.0

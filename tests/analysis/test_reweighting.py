@@ -262,16 +262,19 @@ def test_words_and_lists_of_places_have_weights():
 @for_each(
     ("reweighted", "words"),
     [
-        ({"x3": NARROW}, "is no drawn input of this campaign"),
-        ({"x1": NARROW | {"standard_deviation": 0.3}}, "where it was not drawn at all"),
+        ({"x3": NARROW}, "is not a drawn input of this campaign"),
+        ({"x1": NARROW | {"standard_deviation": 0.3}}, "where no value was drawn"),
         ({"x1": {"kind": "uniform", "low": 0.5, "high": 1.5}}, "0.5 of the new distribution"),
-        ({"x1": {"kind": "uniform", "low": 0.5, "high": 0.51}}, "effective ones, must be at least"),
-        ({"x1": {"kind": "discrete", "values": [0.5]}}, "do not cover the other"),
+        (
+            {"x1": {"kind": "uniform", "low": 0.5, "high": 0.51}},
+            "effective ones, and at least 10 are needed",
+        ),
+        ({"x1": {"kind": "discrete", "values": [0.5]}}, "run a new campaign"),
         ({"x1": {"kind": "normal", "mean": 0.5}}, "standard_deviation is missing"),
-        ({"tail": {"kind": "normal", "mean": 3.2, "standard_deviation": 0.5}}, "hardly reach"),
+        ({"tail": {"kind": "normal", "mean": 3.2, "standard_deviation": 0.5}}, "hardly any of"),
         ({"word": {"kind": "discrete", "values": ["a", "c"]}}, '"c" was never drawn'),
-        ({"listed": NARROW}, "tells no distribution"),
-        ({"pair": NARROW}, "drawn with a correlation to x1"),
+        ({"listed": NARROW}, "has no distribution"),
+        ({"pair": NARROW}, "correlated with x1"),
     ],
 )
 def test_what_samples_do_not_cover_is_refused(reweighted, words):
@@ -292,7 +295,7 @@ def test_what_samples_do_not_cover_is_refused(reweighted, words):
 
 
 def test_designs_without_a_population_are_refused():
-    with pytest.raises(InputError, match="stands for no population"):
+    with pytest.raises(InputError, match="do not represent a population"):
         analyse(drawn_campaign(Morris(samples=20), linear, 2, 1), None, {"x1": NARROW})
 
 
@@ -303,7 +306,7 @@ def test_the_command_line_takes_inputs_as_campaign_files_write_them(tmp_path):
     call = [str(tmp_path), "--reweight", text, "--out", str(tmp_path / "out.nc")]
     done = CliRunner().invoke(analyse_command, call, catch_exceptions=False)
     assert done.exit_code == 0
-    assert "500 samples count as 2" in done.output
+    assert "500 samples worth 2" in done.output
     assert any(line.startswith("asynchrony_max  degree         mean") for line in
                done.output.splitlines())  # fmt: skip
     assert (tmp_path / "out.nc").exists()

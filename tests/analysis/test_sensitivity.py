@@ -115,7 +115,7 @@ def test_a_bootstrap_over_the_blocks_of_one_sequence_would_be_too_long():
     assert hits == 60
     found = analyse(drawn_campaign(Saltelli(samples=64, replicates=1), ishigami, 3, 0))
     assert np.isnan(found.total_index_interval).all()
-    assert any("no intervals: give design.replicates = 8" in line for line in told(found))
+    assert any("no intervals: set design.replicates = 8" in line for line in told(found))
 
 
 @pytest.mark.parametrize("function", [ishigami, lambda x: x[:, 0] - 0.3 * x[:, 1]])
@@ -132,7 +132,7 @@ def test_a_first_order_index_above_the_total_one_is_told_if_their_intervals_are_
     assert not sensitivity_tables(found)[0].notes
     found.first_order_index_interval[0, 0] = found.total_index_interval[0, 0] + 0.02
     (note,) = sensitivity_tables(found)[0].notes
-    assert "first-order indices above total ones of asynchrony_max" in note
+    assert "first-order indices above total indices of asynchrony_max" in note
 
 
 def test_samples_lost_at_random_cost_whole_blocks_and_are_told():
@@ -147,7 +147,7 @@ def test_samples_lost_at_random_cost_whole_blocks_and_are_told():
     assert found.missing_by_inputs > 0.05
     for name, true in zip(("first_order_index", "total_index"), ishigami_indices(), strict=True):
         np.testing.assert_allclose(found[name], true, atol=0.12)
-    assert any("no input seems to decide which" in line for line in told(analyse(made)))
+    assert any("this does not seem to depend on any input" in line for line in told(analyse(made)))
 
 
 def test_samples_that_have_not_run_are_not_lost():
@@ -178,17 +178,19 @@ def test_samples_lost_by_an_input_close_the_gate_and_are_analysed_themselves(des
     values = found[name].sel({"output": "asynchrony_max"})
     assert np.isnan(values).all()
     assert found.missing_by_inputs.sel(output="asynchrony_max") < 1e-6
-    assert found.missing_by_inputs.isel(output=found.output == "lost").isnull().all()
-    lost = found[name].sel({"output": "lost"}).to_series()
+    assert found.missing_by_inputs.isel(output=found.output == "failed runs").isnull().all()
+    lost = found[name].sel({"output": "failed runs"}).to_series()
     # Bins are not steps: the last one of 13 holds part of the jump.
     assert lost["x2"] == pytest.approx(1.0, abs=0.12)
     assert abs(lost.drop("x2")).max() < 0.02
     if dim == "factor":
-        # About 50 of the samples A and B are lost: too few for intervals of first-order indices.
-        own = found.sel(output="lost", factor="x2")
+        # About 50 of the samples A and B fail: too few for intervals of first-order indices.
+        own = found.sel(output="failed runs", factor="x2")
         assert np.isnan(own.first_order_index_interval).all()
         assert own.total_index_interval[0] < 1.0 < own.total_index_interval[1]
-    lines = [line for line in told(found) if line.startswith("no index of asynchrony_max")]
+    lines = [
+        line for line in told(found) if line.startswith("no sensitivity index for asynchrony_max")
+    ]
     assert len(lines) == 1
     assert dim in found.dims
 
@@ -369,7 +371,10 @@ def test_pulleys_matter_by_mean_by_quarter_and_by_place():
 
 
 def test_runs_are_to_be_mended_only_if_they_failed() -> None:
-    for status, words in ((Status.OK, "require or analyse the outcome"), (Status.TIMEOUT, "mend")):
+    for status, words in (
+        (Status.OK, "set a requirement on the outcome"),
+        (Status.TIMEOUT, "run the"),
+    ):
         x = np.random.default_rng(4).random((60, 1))
         gone = x[:, 0] > 0.7
         made = campaign(
@@ -377,6 +382,10 @@ def test_runs_are_to_be_mended_only_if_they_failed() -> None:
             outcome=np.where(gone, Fate.PARTLY_DEPLOYED, Fate.DEPLOYED),
         )  # fmt: skip
         made["x1"] = "sample", x[:, 0], {"role": "input", "path": "x1", "distribution": UNIT}
-        (line,) = (s for s in told(analyse(made)) if s.startswith("no index of asynchrony_max"))
+        (line,) = (
+            s
+            for s in told(analyse(made))
+            if s.startswith("no sensitivity index for asynchrony_max")
+        )
         assert words in line
         assert ("--retry-failed" in line) == (status == Status.TIMEOUT)

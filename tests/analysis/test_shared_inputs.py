@@ -105,7 +105,7 @@ def test_it_is_reweighted_as_a_whole() -> None:
     weights, _ = weights_of(made, read_distributions({"cold": new}))
     np.testing.assert_array_equal(weights > 0, made["temperature_joint_value"] >= 0.5)
     for path in PATHS:
-        with pytest.raises(InputError, match=rf"{path}: is no drawn .*did you mean cold\?"):
+        with pytest.raises(InputError, match=rf"{path}: is not a drawn .*did you mean cold\?"):
             weights_of(made, read_distributions({path: new}))
 
 

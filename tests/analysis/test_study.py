@@ -87,8 +87,8 @@ def test_lost_samples_count_as_the_worst_for_either_verdict():
     assert (low, high) == pytest.approx((share_bounds(230, 240, 0.9)[0], 1.0))
     assert (found.samples_used.item(), found.samples_lost.item()) == (230, 10)
     assert found.asynchrony_max_samples.values.tolist() == [230, 10, 0, 0]
-    assert found.outcome_samples.sel(kind="lost: timeout").item() == 10
-    assert found.outcome_of.sel(kind="lost: timeout").item() == 240
+    assert found.outcome_samples.sel(kind="failed: timeout").item() == 10
+    assert found.outcome_of.sel(kind="failed: timeout").item() == 240
     assert found.outcome_share.sel(kind="deployed").item() == pytest.approx(230 / 240)
     assert found.outcome_lost.sel(kind="deployed").item() == 10
     # More violations than a hundredth, were all lost ones sound: not met all the same.
@@ -102,13 +102,13 @@ def test_further_samples_would_show_only_what_lost_ones_leave_open():
     made = campaign(np.full(100, 9.0), status=status, outcome=np.where(status, 0, 1))
     assert (
         f"asynchrony_max: {samples_needed(10, 0.99, 0.9) - 100} further samples without a "
-        "violation would show it, with 10 lost samples as violations"
+        "violation would prove it (if the 10 failed runs are counted as violations)"
     ) in text_of(analyse(made, MOST_TEN))
     status[:] = Status.TIMEOUT
     found = analyse(made.assign(status=("sample", status)), MOST_TEN)
     assert found.further_samples.item() == -1
     assert "further sample" not in text_of(found)
-    assert "asynchrony_max: no sample has numbers that tell of it" in text_of(found)
+    assert "asynchrony_max: no sample has a valid result for it" in text_of(found)
 
 
 def test_rings_that_never_opened_are_counted_beside_the_limit_that_they_keep_to():
@@ -119,13 +119,13 @@ def test_rings_that_never_opened_are_counted_beside_the_limit_that_they_keep_to(
     made = campaign(values, outcome=outcome)
     found = analyse(made, MOST_TEN)
     assert found.samples_short.item() == 3
-    line = "asynchrony_max: 3 of the 238 that keep to it ended short of their goal"
+    line = "asynchrony_max: 3 of the 238 that meet it ended before their goal"
     assert line in text_of(found)
-    assert 'require the outcome, too, as outcome = { is = "deployed"' in text_of(found)
+    assert 'set a requirement on the outcome, too: outcome = { is = "deployed"' in text_of(found)
     outcome_too = {"outcome": {"is": "deployed", "probability": 0.9, "confidence": 0.9}}
     found = analyse(made, MOST_TEN | outcome_too)
     assert line in text_of(found)
-    assert "require the outcome" not in text_of(found)
+    assert "set a requirement on the outcome" not in text_of(found)
     assert found.samples_short.values.tolist() == [3, 0]
     assert "short of their goal" not in text_of(analyse(campaign(np.full(240, 9.0)), MOST_TEN))
     # What ends at 180 deg is final for rings whose latches then miss; tension is not.
@@ -146,7 +146,7 @@ def test_an_antenna_that_never_deploys_violates_a_deployment_time():
     assert found.samples_violating.item() == found.samples_without_value.item() == 5
     assert verdict(found, "deployment_time") == Verdict.NOT_MET
     assert found.deployment_time_samples.values.tolist() == [45, 0, 5, 0]
-    assert "violations without a value, as the antenna did not get so far: 5" in text_of(found)
+    assert "violations without a value (the antenna did not get that far): 5" in text_of(found)
 
 
 def test_samples_that_have_not_run_are_neither_used_nor_lost():
@@ -213,13 +213,13 @@ def test_grids_and_lists_have_extremes_only(kind):
     assert np.isnan(found.outcome_share).all()
     assert verdict(found) == Verdict.NO_POPULATION
     assert found.samples_violating.item() == 19
-    assert "stands for no population" in text_of(found)
+    assert "do not represent a population" in text_of(found)
 
 
 def test_a_file_without_a_design_has_extremes_alone():
     made = campaign(response(points("random", 60, 1, 0)))
     del made.attrs["design"]
-    assert "does not tell its design" in analyse(made).attrs["intervals"]
+    assert "is not known" in analyse(made).attrs["intervals"]
 
 
 def test_errors_stand_side_by_side():
@@ -243,20 +243,20 @@ def test_a_campaign_of_which_every_run_failed_is_told():
     status = np.full(12, Status.DIVERGED)
     found = analyse(campaign(np.full(12, np.nan), status=status, outcome=np.zeros(12)), MOST_TEN)
     assert verdict(found) == Verdict.NOT_YET_SHOWN
-    assert found.outcome_share.sel(kind="lost: diverged").item() == 1.0
+    assert found.outcome_share.sel(kind="failed: diverged").item() == 1.0
     assert "12 of 12" in text_of(found)
 
 
 @for_each(
     ("made", "wanted", "words"),
     [
-        (xr.Dataset({"status": 0}), None, "only a campaign can be analysed"),
+        (xr.Dataset({"status": 0}), None, "this is not a campaign"),
         (
             campaign([1.0, 2.0]),
             {"peak_tension": MOST_TEN["asynchrony_max"]},
             "the file has no such output",
         ),
-        (campaign([1.0, np.nan]), MOST_TEN, "1 samples reached their goal without a value"),
+        (campaign([1.0, np.nan]), MOST_TEN, "1 sample reached the goal without a value"),
     ],
 )
 def test_what_cannot_be_judged_is_refused(made, wanted, words):

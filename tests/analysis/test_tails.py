@@ -46,8 +46,10 @@ def test_an_event_that_is_not_reached_is_bounded_and_never_told_as_zero(above, s
     table = tail_table(found)
     assert table.head[1] == f"asynchrony_max > {above:g} degree"
     told_of = dict(table.rows)["probability"]
-    assert told_of == f"below {high:.2g}, since {short} of 4 replicates did not reach it"
-    assert f"the nearest run has {made.asynchrony_max.values.max():.6g} degree" in table.notes
+    assert told_of == f"below {high:.2g}: {short} of 4 replicates did not reach the event"
+    assert (
+        f"the run nearest to the event has {made.asynchrony_max.values.max():.6g} degree"
+    ) in table.notes
     assert {*table.notes, table.lines()[0]} <= {*told(found)}
 
 
@@ -63,7 +65,7 @@ def test_samples_of_chains_are_not_judged_as_independent():
     made = campaign(2.5, 8)
     found = analyse(made)
     assert not [name for name in found if "correlation" in str(name)]
-    assert "no input is told to matter: samples of a chain" in "\n".join(told(found))
+    assert "no sensitivity to inputs is given: samples of" in "\n".join(told(found))
     assert not explained(made)
     # The same samples of a list of values have correlations.
     listed = analyse(made.assign_attrs(design='{"kind": "list"}'))

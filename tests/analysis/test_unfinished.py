@@ -77,4 +77,4 @@ def test_indices_and_their_figure_leave_out_blocks_that_have_not_run():
     found = analyse(unfinished(whole, run)).sel(output="asynchrony_max")
     assert (found.index_used, found.index_lost, found.missing) == (40, 0, 0)
     (bars,) = (bars for name, bars in bars_of(unfinished(whole, run)) if name == "asynchrony_max")
-    assert bars.told == "blocks: 40 used, 0 lost"
+    assert bars.told == "blocks: 40 used, 0 left out"

@@ -51,7 +51,7 @@ def test_each_failure_has_its_worst_samples_in_order() -> None:
         degree: [(2, "9 degree"), (5, "8 degree"), (4, "7 degree")],
         "violates least_drive_margin >= 0.2": [(1, "-0.25"), (6, "-0.15"), (0, "0.15")],
         "stalled": [(3, "ended so")],
-        "lost: diverged": [(7, "ended so")],
+        "failed: diverged": [(7, "ended so")],
     }
     # Without a value it is violated, too, and comes after those that tell by how much.
     assert found(asynchrony_max={"max": 8.5})["violates asynchrony_max <= 8.5 degree"] == [
@@ -67,7 +67,7 @@ def test_failures_of_the_same_samples_are_one() -> None:
     wanted = read_requirements({"outcome": {"is": "deployed", **BOUND}}, "file")
     one = worst(made(), wanted)
     assert list(one.worst_failure.values) == ["violates outcome is deployed; stalled",
-                                              "lost: diverged"]  # fmt: skip
+                                              "failed: diverged"]  # fmt: skip
     assert one.worst_failed.values.tolist() == [1, 1]
     assert one.worst_of.values.tolist() == [8, 8]
     assert not worst(made().isel(sample=[0, 1]), {})

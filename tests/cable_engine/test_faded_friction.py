@@ -43,7 +43,7 @@ def test_both_cables_take_one_clause_behind_the_reason_of_the_run() -> None:
     found = run_frame(slowly(both__slip_speed=2e-4, cables__lower__winch__winding=slower))
     reason, remark = found.reason.split("; ")
     assert reason == "solver.end_time = 2 s was reached with 0 of 4 V-joints locked"
-    assert remark.startswith("pulley friction fades, tension up to ")
+    assert remark.startswith("pulley friction is smoothed, tension up to ")
     both = "cables.upper.slip_speed and cables.lower.slip_speed = 0.0002 m/s"
     assert f"{both} must be at most 2.1e-05 m/s" in remark
     assert len(remark) < 160
@@ -61,4 +61,4 @@ def test_silence_where_friction_acts_or_where_there_is_none() -> None:
 
 def test_a_motor_that_stalls_into_a_crawl_is_judged_by_what_it_wound() -> None:
     found = outcome(slowly(both__winch__winding=STALLED, joints__vjoint__viscous=0.5))
-    assert "; pulley friction fades" in found.reason
+    assert "; pulley friction is smoothed" in found.reason

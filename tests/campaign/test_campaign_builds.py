@@ -97,7 +97,7 @@ def test_a_replay_by_another_build_says_so(copied):
 def test_a_folder_that_names_no_build_is_refused(copied):
     with netCDF4.Dataset(copied.folder / "out" / "design.nc", "a") as design:
         design.delncattr("sources")
-    assert "an older ringsim began this campaign" in copied.run(*START, code=2)
+    assert "an older version of ringsim began this campaign" in copied.run(*START, code=2)
 
 
 def test_a_version_that_changed_with_a_figure_goes_on(copied):

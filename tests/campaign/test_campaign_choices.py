@@ -70,12 +70,13 @@ def test_set_and_samples_stand_above_the_file(tmp_path):
     ("old", "new", "settings", "samples", "words"),
     [
         ("", "", {"solver.step": -1.0}, None, r"choosing.toml: set: .*solver.step = -1.0 s must"),
-        ("", "", {"faults": []}, None, "faults has one value by .set. or --set, and others by"),
+        ("", "", {"faults": []}, None, "faults is set by .set. or --set and also drawn"),
         (
             "random", "random",
-            {"cables.upper.friction.coefficient[2]": 1e-4}, None, "has one value by .set. or --set",
+            {"cables.upper.friction.coefficient[2]": 1e-4}, None, "is set by .set. or --set",
         ),
-        ("random", "grid", {}, 4, '--samples 4: a design of kind "grid" has as many as its levels'),
+        ("random", "grid", {}, 4,
+            '--samples 4: a design of kind "grid" has a fixed number of samples'),
         (', samples = 12', "", {}, None, r"design.samples is missing"),
         ("random", "randon", {}, 4, "did you mean random"),
     ],
@@ -109,5 +110,5 @@ def test_choices_reach_the_runs_and_the_merged_file(bench):
     bench.run(*start, solver="")  # nothing is left to run
     assert "identical to the stored result" in bench.run("replay", "out", 1)
     more = bench.run(*start[:2], "--out", "out", solver="", code=2)
-    assert "this folder holds another campaign (its scene differs: solver.tolerance" in more
+    assert "this folder has another campaign (its scene differs: solver.tolerance" in more
     assert "is not in the range" in bench.run(*start[:2], "--samples", 0, code=2)

@@ -27,7 +27,7 @@ def test_a_finished_campaign_is_drawn_and_reported(bench):
     page = (bench.folder / "page.html").read_text()
     with xr.open_dataset(bench.folder / "out" / "campaign.nc") as campaign:
         words = endings(campaign).tolist()
-    assert set(words) == {"deployed", "stalled", "lost: solver failed"}
+    assert set(words) == {"deployed", "stalled", "failed: solver failed"}
     # What ended alike shares a row, with the command that repeats the first of them.
     for word in set(words):
         own = [str(sample) for sample, each in enumerate(words) if each == word]
@@ -38,4 +38,4 @@ def test_a_finished_campaign_is_drawn_and_reported(bench):
 
 def test_formats_without_figures_are_refused(bench):
     told = bench.run("campaign", bench.write(2), "--plot-format", "svg", code=2)
-    assert told.strip() == "--plot-format svg: says nothing without --plot; give both"
+    assert told.strip() == "--plot-format svg: has no effect without --plot; give both"

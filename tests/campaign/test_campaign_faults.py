@@ -101,7 +101,7 @@ def test_too_many_failures_stop_the_campaign(bench):
     printed = bench.run(
         "campaign", file, "--workers", 1, "--out", "out", solver="fake_solver:poisoned", code=3
     )
-    assert "3 samples failed, more than max_failed = 2; 17 samples are left" in printed
+    assert "3 samples failed, more than max_failed = 2; 17 samples left" in printed
     assert "raise max_failed" in printed
     file.write_text(file.read_text().replace("max_failed = 2", "max_failed = 5"))
     bench.run("campaign", file, "--workers", 1, "--out", "out", solver="fake_solver:poisoned")
@@ -112,7 +112,7 @@ def test_no_failure_is_put_up_with_if_none_may_be(bench):
     file = bench.write_listed([30, 30, 1, 30, 30])
     file.write_text("max_failed = 0\n" + file.read_text())
     start = ("campaign", file, "--workers", 1, "--out", "out")
-    told = "1 samples failed, more than max_failed = 0; 2 samples are left: raise max_failed"
+    told = "1 sample failed, more than max_failed = 0; 2 samples left: raise max_failed"
     for _ in range(2):  # a second run does not start anything
         assert told in bench.run(*start, solver="fake_solver:poisoned", code=3)
     file.write_text(file.read_text().replace("max_failed = 0", "max_failed = 1"))
@@ -137,7 +137,7 @@ def test_failures_of_other_parts_count_against_the_limit(bench):
     assert "4 samples failed, more than max_failed = 3" in bench.run(
         *start, "2/2", solver="fake_solver:poisoned", code=3
     )
-    assert "4 samples failed, more than max_failed = 3; 4 samples are left" in bench.run(
+    assert "4 samples failed, more than max_failed = 3; 4 samples left" in bench.run(
         *start, "1/2", solver="fake_solver:poisoned", code=3
     )
 
@@ -199,5 +199,7 @@ def test_results_that_do_not_fit_together_cost_only_themselves(workers, bench):
     assert np.isfinite(result.deployment_time.values[fits]).all()
     assert (result.status.values[~fits] == Status.ERROR).all()
     for k in np.flatnonzero(~fits):
-        what = "differ from those of the first samples" if force[k] <= 0.0135 else "along time"
+        what = (
+            "another size than those of the first samples" if force[k] <= 0.0135 else "along time"
+        )
         assert what in str(result.reason.values[k])

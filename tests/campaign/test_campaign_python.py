@@ -98,7 +98,7 @@ def test_what_is_refused_is_an_input_error(more: dict[str, Any], words: str) -> 
 
 def test_another_campaigns_folder_is_refused() -> None:
     small().run(workers=0)
-    with pytest.raises(InputError, match="this folder holds another campaign"):
+    with pytest.raises(InputError, match="this folder has another campaign"):
         small(seed=6).run(workers=0)
 
 
@@ -143,9 +143,7 @@ def test_verbs_merge_what_was_interrupted_but_not_what_runs(
         assert held
         done = CliRunner().invoke(cli, ["analyse", str(folder)])
         assert done.exit_code == EXIT_BAD_INPUT
-        assert (
-            "runs just now, and its end merges its results: wait for that, or give" in done.output
-        )
+        assert "is running, and merges its results at its end: wait for that, or run" in done.output
         assert not (folder / "campaign.nc").exists()
     few = [each for each in figures.PICTURES if each.name == "distributions"]
     monkeypatch.setattr(figures, "PICTURES", few)
@@ -164,7 +162,7 @@ def test_too_many_failures_are_an_error_and_some_are_not(monkeypatch: pytest.Mon
         raise RuntimeError("it broke")
 
     monkeypatch.setattr(fake_solver, "run", broken)
-    with pytest.raises(CampaignError, match="more than max_failed = 1 samples failed, 2 are left"):
+    with pytest.raises(CampaignError, match="more samples than max_failed = 1 failed, 2 are left"):
         small(max_failed=1).run(workers=0)
     found = small().run(workers=0, out="all")
     assert (found["status"] > 0).all()
@@ -229,7 +227,7 @@ def test_notebooks_have_a_bar(
 
 def test_the_plan_tells_the_cost() -> None:
     told = small().plan(workers=2)
-    assert "4 samples (random design), 4 to run here" in told
+    assert "4 samples (random design), 4 to run" in told
     assert "from a trial run of sample" in told
     assert not Path("runs").exists()
 

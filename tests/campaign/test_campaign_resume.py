@@ -59,7 +59,7 @@ def test_part_merges_what_another_part_that_runs_has_done(copied, whole):
     write_journal(copied, "part2of2-rank0", range(1, 11, 2))
     with reserved(copied.folder / "out", "part2of2", alone=False):
         printed = copied.run("campaign", "small.toml", "--out", "out", "--part", "1/2")
-        assert "this part is done; 5 samples of other parts are left" in printed
+        assert "this part is done; 5 samples of other parts left" in printed
         assert "5 not run" in copied.run("merge", "out")
         assert (copied.result("out").status.values[11::2] == -1).all()
         write_journal(copied, "part2of2-rank1", range(11, 20, 2))
@@ -101,7 +101,7 @@ def test_results_without_their_design_are_refused(copied):
     before = journals(copied)
     (copied.folder / "out" / "campaign.nc").unlink()
     printed = copied.run(*START, code=2)
-    assert "design.nc is gone" in printed
+    assert "but design.nc, which describes their campaign, is missing" in printed
     assert journals(copied) == before
 
 
@@ -126,7 +126,7 @@ def test_a_folder_from_before_a_key_came_says_so(bench):
         assert "restarts = 2\n" in scene
         file.setncattr("scene", scene.replace("restarts = 2\n", ""))
     printed = bench.run(*start, code=2)
-    assert "its scene differs: an older ringsim wrote it without a key of today" in printed
+    assert "its scene differs: it was written by an older version of ringsim" in printed
 
 
 def test_changed_scene_file_is_another_campaign(bench):
@@ -140,7 +140,7 @@ def test_changed_scene_file_is_another_campaign(bench):
     assert "half_bar = 0.2889" in scene
     (bench.folder / "mine.toml").write_text(scene.replace("half_bar = 0.2889", "half_bar = 0.28"))
     printed = bench.run(*start, code=2)
-    assert "this folder holds another campaign (its scene differs" in printed
+    assert "this folder has another campaign (its scene differs" in printed
     assert "differs: structure.half_bar = 0.28 instead of 0.2889)" in printed
 
 
@@ -153,6 +153,7 @@ def test_status_tells_outcomes_as_the_end_of_the_campaign_does(bench):
     told = bench.run("status", "out")
     assert "deployed: 1 of 4\n" in told  # of those that have run
     assert "stalled: 2 of 4 (samples 2, 4): sample 2: nothing drives it" in told
+    assert told.endswith("  next           ringsim campaign FILE --out out continues it\n")
     whole = bench.run("campaign", file, "--out", "out", solver="fake_solver:fated")
     for line in (
         "deployed: 2 of 8\n",
@@ -161,3 +162,6 @@ def test_status_tells_outcomes_as_the_end_of_the_campaign_does(bench):
     ):
         assert line in whole
         assert line in bench.run("status", "out")
+    assert bench.run("status", "out").endswith("  next           ringsim analyse out\n")
+    (bench.folder / "out" / "campaign.nc").unlink()
+    assert bench.run("status", "out").endswith("  next           ringsim merge out\n")

@@ -54,7 +54,7 @@ def test_samples_that_have_not_run_are_left_to_the_plain_command(bench):
     poisoned(bench)
     lose(bench, [2])
     printed = poisoned(bench, *BETTER)
-    assert "1 samples are left: give the command without --retry-failed and --set" in printed
+    assert "1 sample left: run the command without --retry-failed and --set" in printed
     poisoned(bench)
     assert bench.result("out").status.values.tolist() == [0, 0, 0]
     assert bench.result("out").overrides.values.tolist() == ["", WORDS, ""]
@@ -71,17 +71,17 @@ def test_all_ranks_run_with_the_other_settings(bench, mpi):
 def test_nothing_failed_nothing_runs(bench):
     bench.write_listed([30, 30])
     poisoned(bench)
-    assert "no sample has failed: nothing is run again" in poisoned(bench, *BETTER)
+    assert "no sample has failed: nothing to run again" in poisoned(bench, *BETTER)
     assert len(stored(bench)) == 2
 
 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--retry-failed", "--set", "loads.force=0.02"], "another antenna is another campaign"),
+        (["--retry-failed", "--set", "loads.force=0.02"], "for a change of the antenna"),
         (["--retry-failed", "--set", "solver={ step = 0.1 }"], "solver.* or record.* settings"),
-        (["--retry-failed", "--set", "solver.end_time=30.0"], "it shapes the result"),
-        (["--retry-failed", "--set", "record.interval=0.2"], "it shapes the result"),
+        (["--retry-failed", "--set", "solver.end_time=30.0"], "it changes the size of the result"),
+        (["--retry-failed", "--set", "record.interval=0.2"], "it changes the size of the result"),
         (["--retry-failed", "--set", "solver.tolerance=1.0"], "must be at most 0.1"),
         (["--retry-failed", "--set", "solver.tolerence=1e-4"], "did you mean tolerance?"),
         (["--set", "solver.tolerance=1e-4"], "its scene differs: solver.tolerance"),

@@ -52,7 +52,7 @@ def empty(path):
 def test_samples_of_damaged_records_run_again(damage, left, copied, whole):
     (journal,) = journals(copied)
     damage(journal)
-    told = f"{journal.name} is damaged: 1 of its records cannot be used"
+    told = f"{journal.name} is damaged: 1 of its results cannot be read"
     status = copied.run("status", "out")
     assert f"{left} of 20 samples done" in status
     # What is missing at the end of a journal may be there in a moment.
@@ -102,7 +102,7 @@ def test_folder_of_another_campaign_is_refused(old, new, named, copied):
     file = copied.folder / "small.toml"
     file.write_text(file.read_text().replace(old, new))
     printed = copied.run("campaign", file, "--out", "out", code=2)
-    assert "this folder holds another campaign" in printed
+    assert "this folder has another campaign" in printed
     assert named in printed
     assert "--out" in printed
 
@@ -170,7 +170,7 @@ def test_replay_runs_no_code_that_a_file_names(copied):
     with netCDF4.Dataset(path, "a") as file:
         file.solver = "os:system"
     printed = copied.run("replay", "out", "0", code=2)
-    assert "names the solver 'os:system', which is none of ringsim's" in printed
+    assert "names the solver 'os:system', which ringsim does not have" in printed
 
 
 def test_time_left_counts_samples_and_checks_apart(copied):
@@ -180,7 +180,7 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     checked = SimpleNamespace(unchecked=lambda: np.array([0, 5]))
     assert time_left(checked, left, each, 2) == "about 34 s"
     assert time_left(checked, left, np.array([4.0, 0.0]), 2) == (
-        "about 4 s, and 2 checks, of which none has ended yet"
+        "about 4 s, plus 2 checks of unknown duration"
     )
     assert time_left(folder, left, each, 2) == "about 4 s"
     # The last one leaves workers idle; nothing is known before one has ended.
@@ -212,9 +212,10 @@ def test_running_campaign_tells_its_status_and_keeps_others_out(bench):
             break
         time.sleep(0.1)
     assert "running, 2 workers" in told
+    assert told.endswith("  next           wait; ringsim merge out gives the results so far\n")
     assert "time left" in told
     printed = bench.run(*start, solver="fake_solver:slow", code=2)
-    assert "another process runs this campaign" in printed
+    assert "another process is running this campaign" in printed
     assert "not run" in bench.run("merge", "out")
     process.kill()
     process.communicate()
@@ -271,7 +272,7 @@ def test_full_disk_stops_the_campaign_and_loses_no_finished_sample(
     printed = bench.run(*start, ranks=ranks, code=2)
     line = next(line for line in printed.splitlines() if "cannot be written" in line)
     assert "No space left on device" in line or "HDF error" in line
-    assert "make room" in line
+    assert "free some space" in line
     subprocess.run(["mount", "-o", "remount,size=200m", str(small_disk)], check=True)
     told = bench.run("status", small_disk / "out")
     done = int(told.splitlines()[0].split(": ")[1].split()[0])
@@ -295,7 +296,7 @@ def test_launcher_of_another_mpi_is_refused(launcher, bench, mpi):
     bench.extra |= LAUNCHERS[launcher]
     printed = bench.run("campaign", bench.write(), "--out", "out", code=2)
     (line,) = printed.splitlines()
-    assert "started 4 processes, but each is alone in its MPI world" in line
+    assert "started 4 processes, but they do not see each other" in line
     assert "MPICH" in line
     assert "mpiexec" in line
     assert not (bench.folder / "out").exists()

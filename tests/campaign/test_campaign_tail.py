@@ -94,9 +94,9 @@ def test_the_report_shows_the_tail_and_no_means_of_its_samples(tail, monkeypatch
 def test_plan_and_status_tell_that_more_runs_follow(tail, bench):
     write(bench)
     printed = bench.run(*START, "--dry-run")
-    assert "160 so far: their results tell which come next; 800 at most" in printed
+    assert "160 so far, at most 800: results decide on further ones" in printed
     assert re.search(r"predicted +about .* for these, up to .* with all levels$", printed.strip())
-    assert re.search(r"runs +\d+, and all levels have run", tail.run("status", "out"))
+    assert re.search(r"runs +\d+, all levels completed", tail.run("status", "out"))
     assert "nothing is left to run" in tail.run(*START, "--dry-run")
 
 
@@ -137,7 +137,7 @@ def test_runs_in_the_event_are_repeated_with_the_full_engine(bench, tail):
     path.write_text(text.replace('scene = "ring18"', 'scene = "ring18"\nfidelity = "frame"'))
     more = ("--workers", 0, "--judge", "fake_solver:judge")
     printed = bench.run(*START, *more)
-    assert re.search("in the event by the full engine, too +4 of 4 repeated runs", printed)
+    assert re.search("in the event with the full engine, too +4 of 4 repeated runs", printed)
     found = bench.result("out")
     checked = found.status_checked.values == 0
     assert checked.sum() == 7

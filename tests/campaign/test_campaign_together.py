@@ -42,7 +42,7 @@ def test_stop_signal_interrupts_a_merge_and_the_next_run_merges(number, copied, 
         process.send_signal(number)
         printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
-    assert f"stopped by {number.name}; the samples are not merged yet" in printed
+    assert f"stopped by {number.name}; the results are not merged yet" in printed
     assert not (out / "campaign.nc").exists()
     copied.run(*START)
     assert_same(copied, whole)
@@ -109,7 +109,7 @@ def test_growing_a_campaign_that_runs_is_refused(copied):
     with locked(copied.folder / "out" / "lock") as held:
         assert held
         printed = copied.run("campaign", copied.write(30), "--out", "out", code=2)
-    assert "another process runs this campaign" in printed
+    assert "another process is running this campaign" in printed
     assert open_folder(copied.folder / "out").table.samples == 20
 
 
@@ -148,7 +148,7 @@ def test_one_sample_is_a_campaign(bench):
     result = bench.result("out")
     assert result.sizes["sample"] == 1
     assert result.status.values.tolist() == [0]
-    assert "1 of 1 samples done, 0 left" in bench.run("status", "out")
+    assert "1 of 1 sample done, 0 left" in bench.run("status", "out")
 
 
 @pytest.mark.parametrize("name", ["ü-Ω 100%", "a#mode=bytes", "[x]*", "file:name", "-x\n'\""])

@@ -142,7 +142,7 @@ def test_looks_are_whole_replicates():
         (('requirement = "dep', 'requirement = "de'), "not among the requirements"),
         ((", half_width = 0.6", ""), "needs half_width"),
         (('{ of = "deployment_time"', '{ of = "opening_angle"'), "has a value for each plane"),
-        (('{ of = "dep', '{ requirement = "x", of = "dep'), "either requirement"),
+        (('{ of = "dep', '{ requirement = "x", of = "dep'), "needs either"),
         (("stop_when = [", "set_aside = ["), "set_aside"),
         (('of = "deployment_time"', 'of = "peak_tension"'), "it has no cables"),
     ],

@@ -78,7 +78,7 @@ def test_a_checkout_that_is_not_compiled_takes_the_installed_library(
     monkeypatch.setattr(library, "distributions", lambda name: made)
     assert library._library.__wrapped__().compiled_from().decode() == library._digest()
     (checkout / "laws.c").write_text("other sources")
-    with pytest.raises(NotBuiltError, match="of other sources"):
+    with pytest.raises(NotBuiltError, match="from other sources"):
         library._library.__wrapped__()
 
 
@@ -86,7 +86,7 @@ def test_a_checkout_that_is_not_compiled_takes_the_installed_library(
 def test_a_library_of_other_sources_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a change of them a checkout must be compiled again: tables may have other fields."""
     monkeypatch.setattr(library, "_digest", lambda: "0123")
-    with pytest.raises(NotBuiltError, match="was compiled of other sources: install it"):
+    with pytest.raises(NotBuiltError, match="was compiled from other sources: run pip install"):
         library._library.__wrapped__()
 
 
@@ -117,7 +117,7 @@ def test_a_core_that_is_not_compiled_is_told_with_the_cure(
 ) -> None:
     monkeypatch.setattr(library, "_FOLDER", tmp_path)
     monkeypatch.setattr(library, "distributions", lambda name: [])
-    with pytest.raises(NotBuiltError, match=r"not compiled here: install it \(pip install \.\)"):
+    with pytest.raises(NotBuiltError, match=r"not compiled here: run pip install \."):
         library._library.__wrapped__()
 
 

@@ -161,7 +161,7 @@ def test_the_tutorial_takes_five_commands(tmp_path: Path, monkeypatch: pytest.Mo
         done = CliRunner().invoke(cli, [verb, *arguments])
         assert done.exit_code == 0, done.output
         printed.append(done.output)
-    assert "3 to run here" in printed[0]
+    assert "3 to run" in printed[0]
     assert "partly deployed: 1 of 3 (sample 2)" in printed[1]  # the one whose motor stops
     assert "outcome is deployed" in printed[2]
     assert (tmp_path / "late-motor.html").stat().st_size < 2e6
@@ -187,10 +187,16 @@ def test_the_tutorial_takes_twelve_lines_of_python(tmp_path: Path) -> None:
     assert (written.seed, written.design.samples) == (file["seed"], file["design"]["samples"])
 
 
-def test_the_list_of_printed_texts_has_them_with_their_values_and_no_docstring() -> None:
+def test_the_list_of_printed_texts_has_them_with_their_values_and_what_explain_and_help_say() -> (
+    None
+):
     command = [sys.executable, ROOT / "docs" / "printed_texts.py"]
     listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert "no input matters more than chance would explain for {', '.join(quiet)}" in listed
+    assert "no significant input for {', '.join(quiet)}" in listed
     assert "## ringsim/report/page.html.j2" in listed
+    lines = {line.partition(": ")[2] for line in listed.splitlines()}
+    assert {"Draw figures beside campaign.nc.", "violating", "Distributions"} <= lines
+    assert any(each.startswith("Show how many samples of the campaign in FOLDER") for each in lines)
+    assert not any("(?" in each or "\\d" in each for each in lines)
     assert "Lists every text that" not in listed
     assert "How far a campaign is, also while its folder is being filled" not in listed

@@ -38,8 +38,8 @@ def test_what_exceeds_its_bar_is_named_alone() -> None:
 def test_codes_have_no_size_and_not_everything_has_a_bar() -> None:
     new = moved(asynchrony_laggard_plane=[1, 0])
     assert judged(["asynchrony_laggard_plane"], new, OLD, BARS) == [
-        "none of these has an error bar"
+        "none of these outputs has an error bar"
     ]
     assert judged(["latch_rate"], moved(latch_rate=[0.0, 0.1]), OLD, {})[1:] == [
-        "none of these has an error bar"
+        "none of these outputs has an error bar"
     ]

@@ -110,8 +110,8 @@ def test_chosen_variables_alone_are_written(file: Path, campaign: xr.Dataset) ->
     table = pd.read_csv(file.parent / "own" / "campaign-sample.csv")
     assert list(table) == ["sample", "cables_lower_winch_stop_time (s)"]
     told = export(file, "--variables", "asynchrony_mx", code=2)
-    assert "asynchrony_mx: is no variable of this file (did you mean asynchrony" in told
-    assert "says nothing to --format pvd" in export(
+    assert "asynchrony_mx: is not a variable of this file (did you mean asynchrony" in told
+    assert "has no effect with --format pvd" in export(
         file, "--format", "pvd", "--sample", 0, *chosen, code=2
     )
 
@@ -197,12 +197,12 @@ def test_what_cannot_be_exported_is_refused(
 ) -> None:
     xr.Dataset({"verdict": 1.0}).to_netcdf(file.with_name("analysis.nc"))
     refusals = [
-        ((file, "--format", "xls"), "--format xls: 'xls' is no format to export to (known: csv"),
-        ((file, "--format", "pvd"), "shows runs, and this is a campaign: choose"),
+        ((file, "--format", "xls"), "--format xls: 'xls' is not an export format (known: csv"),
+        ((file, "--format", "pvd"), "is for single runs, and this is a campaign: choose"),
         ((file, "--sample", 9), "--sample 9: "),
-        ((run_file, "--sample", 0), "holds one run: leave it out"),
+        ((run_file, "--sample", 0), "has only one run: leave it out"),
         ((file, "--format", "pvd", "--sample", 3), "ended before its first record: there is noth"),
-        ((file.with_name("analysis.nc"),), "holds neither a run nor a campaign"),
+        ((file.with_name("analysis.nc"),), "has neither a run nor a campaign"),
         ((file.with_name("gone.nc"),), "there is no such file"),
     ]  # fmt: skip
     for words, told in refusals:

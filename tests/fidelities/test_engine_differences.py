@@ -70,7 +70,7 @@ def test_the_last_line_says_whether_bars_cover_the_differences() -> None:
     lines = check_lines(campaign())
     assert lines[0] == "3 of 4 samples were checked with the full engine"
     assert lines[1] == "1 check failed, first sample 3: too stiff"
-    assert lines[2] == "median and worst are of the 2 samples that ended well with both engines"
+    assert lines[2] == "median and worst are over the 2 samples that both engines completed"
     assert lines[-1] == (
         "the engines differ by more than their error bars in deployment_time (sample 1: 0.03 s, "
         "error bars 0.025)"
@@ -86,7 +86,8 @@ def test_the_last_line_says_whether_bars_cover_the_differences() -> None:
         asynchrony_max=none, asynchrony_max_checked=none,
     )  # fmt: skip
     assert check_lines(two)[-1] == (
-        "the engines differ by no more than their error bars in the 1 of 2 outputs that have some"
+        "the engines differ by no more than their error bars in the 1 of 2 outputs that have "
+        "error bars"
     )
     silent = campaign().drop_vars(["deployment_time_error", "deployment_time_error_checked"])
     assert "error bars in" not in check_lines(silent)[-1]

@@ -93,9 +93,7 @@ def test_who_names_no_engine_gets_frames_where_they_represent_the_scene(tmp_path
     with xr.open_dataset(tmp_path / "run.nc") as found:
         assert found["fidelity"].item() == Fidelity.FRAME
     first, second, *_ = called("run", "planar-truss", *short).splitlines()
-    assert first == (
-        'the full model runs it: fidelity = "frame" does not represent prismatic joints'
-    )
+    assert first == ('using the full model: fidelity = "frame" does not represent prismatic joints')
     assert second.startswith("planar-truss: ok")
     with xr.open_dataset(tmp_path / "run.nc") as found:
         assert found["fidelity"].item() == Fidelity.FULL
@@ -135,4 +133,4 @@ def test_measured_settings_are_for_one_engine() -> None:
 
 def test_settings_of_an_engine_that_was_not_measured_are_refused() -> None:
     printed = called("run", "planar-truss", "--accuracy", "0.05", "--fidelity", "frame", code=2)
-    assert "no settings of it were measured with planar-truss" in printed
+    assert "no settings were measured for this fidelity with planar-truss" in printed

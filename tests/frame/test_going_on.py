@@ -183,11 +183,14 @@ def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:
         ({"structure.half_bar": 0.29}, r"structure.half_bar = 0.29: .* layout .*0.2889.*without"),
         ({"rods.elements": 3}, r"rods.elements = 3: .*layout"),
         ({"cables.upper": "none", "faults": []}, "cables.upper.* left out: .*layout"),
-        ({"faults": []}, "cannot be made whole: keep that fault"),
+        ({"faults": []}, "cannot be undone: keep that fault"),
         ({"faults": [*own, early]}, r"faults\[1\].time = 0.003 s: has not struck .* after"),
         ({"solver.end_time": 0.008, "solver.step": 0.008}, "end_time = 0.008 s: must be after"),
         ({"solver.error_bars": True}, "error_bars = true: .* set it to false"),
-        ({"cables.upper.initial_slack": 0.001}, "initial_slack = 0.001: says how a run begins"),
+        (
+            {"cables.upper.initial_slack": 0.001},
+            "initial_slack = 0.001: this value is for the start of a run",
+        ),
         ({"record.positions": True}, "record: .* no readings of position: leave out"),
     ):
         with pytest.raises(InputError, match=words):
@@ -199,7 +202,7 @@ def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:
     ):
         read_state(file, 0.015)
     ended = _ended(tmp_path)
-    with pytest.raises(InputError, match="same: take an earlier state"):
+    with pytest.raises(InputError, match="unchanged: start from an earlier state"):
         simulate(ended.scene, start=ended)
     with pytest.raises(InputError, match='"full" stores no states'):
         simulate(truss(), "full")
@@ -218,7 +221,7 @@ def _ended(folder: Path) -> StoredState:
 def test_a_file_without_states_is_refused(tmp_path: Path) -> None:
     short = truss(solver__end_time=0.01, solver__step=0.01, record__state_interval="none")
     save(simulate(short, "frame"), tmp_path / "run.nc")
-    with pytest.raises(InputError, match=r"holds no states: .*record.state_interval=1"):
+    with pytest.raises(InputError, match=r"has no stored states: .*record.state_interval=1"):
         read_state(tmp_path / "run.nc")
     with pytest.raises(InputError, match="no such file"):
         read_state(tmp_path / "missing.nc")
@@ -251,7 +254,7 @@ def test_the_command_goes_on(tmp_path: Path) -> None:
         assert data.attrs["fidelity"] == "frame"
         assert float(data["final_time"]) == pytest.approx(0.02)
     for words, told in (
-        (["--at", "0.01"], "--at 0.01: says nothing without --from"),
+        (["--at", "0.01"], "--at 0.01: has no effect without --from"),
         (["--from", first, "--at", "0.015"], "it has 0.01, 0.02 s"),
         (["--from", first, "--fidelity", "both"], 'choose fidelity = "frame"'),
     ):

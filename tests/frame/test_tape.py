@@ -142,7 +142,7 @@ def branching(x: Any) -> Any:
         (lambda x: max(x, 0.0), "branches"),
         (lambda x: np.where(np.asarray(x) > 0.0, x, 9.0), "branches"),
         (lambda x: (x > 0.0) and (x < 1.0), "branches"),
-        (lambda x: (x, x), "2 things, not 1"),
+        (lambda x: (x, x), "2 values, not 1"),
         (lambda x: x.sum(), "sum"),
     ],
 )

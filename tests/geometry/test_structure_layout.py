@@ -194,7 +194,7 @@ def with_bare(parts: dict[str, Any], *, swapped: bool = False) -> Layout:
     [
         ("boom", r'boom: this structure has no corners .* 2 of its planes.*\(boom = "none"\)'),
         ("net", r'net: this structure has no corners .* 1 of its planes.*\(net = "none"\)'),
-        ("cables", r"no track for a cable in plane 1: leave it out, or give Draft.tracks one"),
+        ("cables", r"no cable path in plane 1: leave the cable out, or add a path to Draft.tracks"),
     ],
 )
 def test_what_a_structure_cannot_hold_is_refused(part: str, wanted: str) -> None:

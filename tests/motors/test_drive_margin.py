@@ -159,7 +159,7 @@ def test_the_least_margin_is_least() -> None:
     ("values", "text"),
     [
         ({"cables.upper.winch.winding": {"kind": "constant", "speed": 0.1}},
-         r"cables.upper.winch.winding.kind = .constant.: it pulls with any force.* leave margin"),
+         r"cables.upper.winch.winding.kind = .constant.: its force is not limited.* leave margin"),
         ({"cables": "none"}, "nothing drives the ring"),
         ({"margin": {"kind": "ecss"}}, "margin.kind"),
         ({"margin.friction": -1.0}, "margin.friction"),

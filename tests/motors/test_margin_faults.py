@@ -163,15 +163,15 @@ def test_check_says_what_it_counts(tmp_path: Path) -> None:
 
     text = told(scene)
     assert "faults[1], failed-spring at 0 s: counted\n" in text
-    assert "faults[2], cut-cable at 0.5 s: strikes later, not counted here; a run" in text
+    assert "faults[2], cut-cable at 0.5 s: strikes later, not included here; a run" in text
     assert "faults[3], failed-latch at 0 s: changes nothing" in text
-    assert "cables.upper.winch: stops at 4 s; a run counts it until then\n" in text
+    assert "cables.upper.winch: stops at 4 s; a run includes it until then\n" in text
     stuck = told(sprung(faults=[{"kind": "stuck-vjoint", "section": 1, "time": 0.0}]))
     assert "faults[1], stuck-vjoint at 0 s: with rigid rods it holds the whole ring" in stuck
     assert re.search(r"^nasa-std-5017b: least margin -1.000 at 60.00 deg: NOT enough$", stuck, re.M)
     late = told(sprung(cables__lower__winch__start_time=2.0))
-    assert "cables.lower.winch: starts at 2 s, not counted here\n" in late
-    assert "cables.lower.winch: never turns, not counted\n" in told(
+    assert "cables.lower.winch: starts at 2 s, not included here\n" in late
+    assert "cables.lower.winch: never turns, not included\n" in told(
         sprung(cables__lower__winch__stop_time=0.0)
     )
 

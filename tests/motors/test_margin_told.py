@@ -107,7 +107,7 @@ def test_a_dead_winch_is_told_beside_a_strong_one(scene: Scene, tmp_path: Path) 
         text,
         re.M,
     )
-    assert "both planes drive alike" in told(tmp_path / "even.toml", scene)
+    assert "both planes are equal" in told(tmp_path / "even.toml", scene)
 
 
 def test_where_round_off_resists_there_is_no_number(scene: Scene, tmp_path: Path) -> None:
@@ -120,7 +120,7 @@ def test_where_round_off_resists_there_is_no_number(scene: Scene, tmp_path: Path
 def test_check_refuses_a_drive_without_limit() -> None:
     result = CliRunner().invoke(cli, ["check", "truss2", "--margin"])
     assert result.exit_code == 2
-    assert 'cables.upper.winch.winding.kind = "constant": it pulls with any force' in result.stderr
+    assert 'cables.upper.winch.winding.kind = "constant": its force is not limited' in result.stderr
 
 
 def test_a_run_draws_what_resists_and_its_least_margin(

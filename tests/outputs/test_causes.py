@@ -81,7 +81,7 @@ def test_a_journal_keeps_cause_and_outcome() -> None:
 
 
 def test_a_reason_is_its_sentence() -> None:
-    reason = Reason(Cause.NEWTON, "the solver gave up")
-    assert reason == "the solver gave up"
+    reason = Reason(Cause.NEWTON, "the solver stopped")
+    assert reason == "the solver stopped"
     assert not Reason()
     assert Reason().cause is Cause.NONE

@@ -55,11 +55,11 @@ def test_a_hinge_turns_about_the_axis_of_its_body(kind: str) -> None:
         ),
         (
             {"stop": SpringDamperStop()},
-            "joints that open, which would be held: leave it out (stop =",
+            "opening joints for it to act on: leave it out (stop =",
         ),
         (
             {"faults": (StuckVJoint(time=0.1, section=1),)},
-            "faults[1]: this structure has no joints that open",
+            "faults[1]: this structure has no opening joints",
         ),
     ],
 )

@@ -101,7 +101,7 @@ def test_the_verbs_write_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(figures, "PICTURES", ONE_PICTURE)
     code, told = run("run", "truss2", "--set", "solver.end_time=0.3", "--animate")
     assert code == 0
-    assert "wrote truss2.gif\nit shows computed positions with --set record.pos" in told
+    assert "wrote truss2.gif\ncomputed positions need --set record.pos" in told
     with Image.open("truss2.gif") as found:
         assert found.n_frames > 1
         found.seek(found.n_frames - 1)
@@ -116,9 +116,9 @@ def test_what_it_cannot_show_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
     save(made_campaign(3, failed=(1,), not_run=(2,)), Path("many.nc"))
     monkeypatch.setattr(figures, "PICTURES", ONE_PICTURE)
     for words, told in (
-        (("plot", "many.nc", "--colour", "lag"), "says nothing without --animate"),
-        (("plot", "many.nc", "--sample", 1), "says nothing without --animate"),
-        (("plot", "many.nc", "--animate", "--sample", 7), "holds samples 0 to 2"),
+        (("plot", "many.nc", "--colour", "lag"), "has no effect without --animate"),
+        (("plot", "many.nc", "--sample", 1), "has no effect without --animate"),
+        (("plot", "many.nc", "--animate", "--sample", 7), "has samples 0 to 2"),
         (("plot", "many.nc", "--animate", "--sample", 2), "ended before its first record"),
         (("plot", "many.nc", "--animate", "--colour", "stress"), "record.stress=true"),
         (("run", "truss2", "--animate", "--colour", "stress"), "give --set record.stress=true"),

@@ -126,7 +126,7 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     figure = by_input(mixed)
     points = {c.get_label(): c.get_offsets() for c in figure.axes[1].collections}
     assert {name: len(at) for name, at in points.items()} == {
-        "deployed (5)": 5, "lost: timeout (2)": 2,
+        "deployed (5)": 5, "failed: timeout (2)": 2,
     }  # fmt: skip
     np.testing.assert_allclose(points["deployed (5)"][:, 0], np.array(GOOD) + 1.0)
     np.testing.assert_allclose(points["deployed (5)"][:, 1], mixed["asynchrony_max"].values[GOOD])
@@ -140,9 +140,9 @@ def test_no_figure_drops_a_sample_in_silence(mixed: xr.Dataset) -> None:
     for picture, figure in figures_of(with_motors(mixed)):
         told = words(figure)
         if picture.name == "by_input":
-            assert "7 of 8 samples run; 2 without" in told
+            assert "7 of 8 samples run; the 2 without" in told
         else:
-            assert "5 of 8 samples; left out: 2 lost: timeout, 1 not run" in told, picture.name
+            assert "5 of 8 samples; left out: 2 failed: timeout, 1 not run" in told, picture.name
 
 
 def test_the_median_is_a_sample_and_the_worst_has_the_largest_asynchrony(
@@ -286,7 +286,7 @@ def test_of_blocks_figures_show_the_samples_that_the_analysis_takes() -> None:
     (axes,) = (a for a in figure.axes if a.get_title(loc="left").startswith("Largest tension"))
     told = analyse(campaign)["peak_tension"].sel(statistic="mean")
     assert axes.lines[0].get_ydata()[-1] == pytest.approx(float(told))
-    assert "16 of 16 samples; none lost. Of blocks the samples A and B" in words(figure)
+    assert "16 of 16 samples; no run failed. Only the samples A and B" in words(figure)
 
 
 def test_one_at_a_time_names_every_change() -> None:

@@ -66,8 +66,8 @@ def test_figures_are_png_beside_the_file_or_in_the_folder_asked_for(file: Path) 
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ("svgz", "--plot-format svgz: 'svgz' is no format of a figure (did you mean svg?)"),
-    ("png,", "--plot-format png,: '' is no format of a figure (known: png, svg, pdf)"),
+    ("svgz", "--plot-format svgz: 'svgz' is not a figure format (did you mean svg?)"),
+    ("png,", "--plot-format png,: '' is not a figure format (known: png, svg, pdf)"),
 ])  # fmt: skip
 def test_an_unknown_format_is_refused(text: str, words: str, file: Path) -> None:
     for verb in (["plot", str(file)], ["run", "ring18", "--plot"]):
@@ -77,7 +77,7 @@ def test_an_unknown_format_is_refused(text: str, words: str, file: Path) -> None
 
 def test_a_format_without_figures_is_refused(tmp_path: Path) -> None:
     done = ringsim("run", "ring18", "--plot-format", "svg", "--out", str(tmp_path / "a.nc"))
-    words = "--plot-format svg: says nothing without --plot; give both"
+    words = "--plot-format svg: has no effect without --plot; give both"
     assert (done.exit_code, done.stderr.strip()) == (EXIT_BAD_INPUT, words)
 
 
@@ -87,9 +87,9 @@ def test_files_that_hold_no_run_are_refused(file: Path, failed: xr.Dataset) -> N
     text.write_text("no netCDF")
     xr.Dataset({"x": 1.0}).to_netcdf(other)
     for path, words in (
-        (campaign, "holds neither a run nor a campaign: give a file that ringsim run or ringsim"),
+        (campaign, "has neither a run nor a campaign: give a file that ringsim run or ringsim"),
         (text, "cannot be read as a netCDF file: "),
-        (other, "holds neither a run nor a campaign: give a file that"),
+        (other, "has neither a run nor a campaign: give a file that"),
         (file.with_name("c.nc"), "there is no such file or folder"),
     ):
         done = ringsim("plot", str(path))
@@ -99,7 +99,7 @@ def test_files_that_hold_no_run_are_refused(file: Path, failed: xr.Dataset) -> N
 
 
 SHORT = ("--set", "structure.sections=3", "--set", "boom=none", "--set", "solver.end_time=0.5")
-HINT = "stresses are drawn with --set record.stress=true"
+HINT = "figures of stress need --set record.stress=true"
 
 
 @pytest.mark.usefixtures("_stresses")

@@ -70,7 +70,7 @@ def test_bars_are_the_indices_of_the_analysis(design, measure) -> None:
     ends = known[f"{measure}_interval"].values[np.argsort(-known[measure].values)]
     drawn = [segment[:, 0] for segment in whiskers.get_segments()]
     np.testing.assert_allclose(drawn, ends)
-    assert "used, 0 lost" in figure.axes[0].get_xlabel()
+    assert "used, 0 left out" in figure.axes[0].get_xlabel()
 
 
 def test_few_plain_samples_have_correlations() -> None:
@@ -94,18 +94,18 @@ def test_what_chance_would_explain_has_no_bar() -> None:
     assert not bars.names
     told = " ".join(each.get_title().get_text() for each in tornado(campaign).legends)
     told += tornado(campaign).get_supxlabel()
-    assert "more than chance would explain for peak_tension" in " ".join(told.split())
+    assert "No significant input for peak_tension" in " ".join(told.split())
 
 
 def test_a_shut_gate_is_told_with_what_is_known_beside_it() -> None:
     campaign = made(Saltelli(samples=64), lost=0.9)
     figure = tornado(campaign)
     assert "no index: " in figure.axes[0].get_xlabel()
-    assert "by their inputs" in figure.axes[0].get_xlabel()
+    assert "depends on inputs" in figure.axes[0].get_xlabel()
     outputs = dict(bars_of(campaign))
     assert outputs["peak_tension"].measure == "partial_rank_correlation"
-    assert outputs["lost"].measure == "total_index"
-    assert outputs["lost"].names[0] == "modulus"
+    assert outputs["failed runs"].measure == "total_index"
+    assert outputs["failed runs"].names[0] == "modulus"
     assert "left out: " in figure.legends[0].get_title().get_text()
 
 
@@ -118,7 +118,7 @@ def test_what_has_no_interval_is_told_and_measures_differ_in_colour() -> None:
     assert measures == ["rank_correlation", "given_data_index"]
     figure = tornado(campaign)
     told = " ".join(figure.legends[0].get_title().get_text().split())
-    assert "Bars without: the interval is not known" in told
+    assert "Bars without whiskers: interval not known" in told
     colours = {axes.patches[0].get_facecolor() for axes in figure.axes}
     assert len(colours) == 2
     whole = tornado(made(RandomDesign(samples=60)))

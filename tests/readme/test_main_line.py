@@ -40,7 +40,7 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Path:
     printed = run([verb, *arguments], folder)
     written = re.findall(r"^wrote (.+)$", printed, re.MULTILINE)
     assert {(folder / name).is_file() for name in written} == {True}
-    assert printed.endswith("stresses are drawn with --set record.stress=true\n")
+    assert printed.endswith("figures of stress need --set record.stress=true\n")
     return folder
 
 

@@ -151,7 +151,7 @@ def test_a_printed_scene_stands_beside_the_schema_that_it_names(tmp_path: Path) 
     ("arguments", "words"),
     [
         (["explain", "--schema", "scenes"], "did you mean scene?"),
-        (["explain", "--schema", "scene", "asynchrony"], "give one of both"),
+        (["explain", "--schema", "scene", "asynchrony"], "give one of the two"),
         (["scenes", "--out", "my.toml"], "needs the name of a scene"),
         (["scenes", "ring18", "--out", "absent/my.toml"], "create it first"),
     ],

@@ -195,7 +195,7 @@ def test_the_verb_writes_the_page_and_refuses_what_it_cannot_write(
     assert "stop.stiffness" in out.read_text(encoding="utf-8")
     for more, told in (
         (["--report", str(tmp_path / "page.txt")], "the page is HTML: write page.html"),
-        (["--pdf"], "--pdf: says nothing without --report"),
+        (["--pdf"], "--pdf: has no effect without --report"),
         (["--report", str(tmp_path / "none" / "page.html")], "none"),
     ):
         done = CliRunner().invoke(cli, ["compare", *paths, *more])

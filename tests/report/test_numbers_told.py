@@ -183,15 +183,15 @@ def _fits(line: str, spans: list[tuple[int, int]]) -> bool:
 
 def outcomes(file: File, rows: list[dict[str, str]]) -> None:
     wanted = {FATES[int(c)] for c in file.values["outcome"][file.ok]}
-    wanted |= {f"lost: {LOSSES[int(c)]}" for c in file.values["status"][file.lost]}
+    wanted |= {f"failed: {LOSSES[int(c)]}" for c in file.values["status"][file.lost]}
     assert {row["outcome"] for row in rows} == wanted
     of = file.ok | file.lost
     run, total, gone = np.flatnonzero(of), int(of.sum()), int(file.lost.sum())
     for row in rows:
         own, _ = file.group(row["outcome"])
         # What lost ones would have done nobody knows: none of them may be of the kind, or all.
-        count, more = int(own.sum()), 0 if row["outcome"].startswith("lost") else gone
-        assert row["samples"] == f"{count} of {total}" + f" ({more} lost)" * bool(more)
+        count, more = int(own.sum()), 0 if row["outcome"].startswith("failed") else gone
+        assert row["samples"] == f"{count} of {total}" + f" ({more} failed)" * bool(more)
         ends = share_interval(count, total)[0], share_interval(count + more, total)[1]
         estimate_agrees(row["share"], count / total, ends)
         interval_agrees(row["95 % interval"], ends)
@@ -206,7 +206,11 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
     for name, row in zip(file.wanted, rows, strict=True):
         level, share = file.wanted[name]["confidence"], file.wanted[name]["probability"]
         bad = int(file.violating(name).sum())
-        assert (row["used"], row["violating"], row["lost"]) == (str(used), str(bad), str(lost))
+        assert (row["used"], row["violating"], row["failed runs"]) == (
+            str(used),
+            str(bad),
+            str(lost),
+        )
         agrees(row["estimate"], 1 - bad / used)
         agrees(row["probability"], share)
         agrees(row["confidence"], level)
@@ -222,7 +226,7 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
         assert row["verdict"] == word(ends)
         if lost:
             alone = word(bound(used - bad, used, level))
-            assert row["if lost ones were as the others"] == alone
+            assert row["verdict without failed runs"] == alone
         many = range(worse + 1, 10_000)
         needed = next(n for n in many if bound(n - worse, n, level)[0] >= share)
         further = needed - run if row["verdict"] == "not yet shown" else 0
@@ -231,17 +235,17 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
             start = f"{name}: {bad} of {used} violate it so far; " if bad else f"{name}: "
             start += f"{further} further sample"
             assert any(each.startswith(start) for each in lines)
-            assert not lost or any(f"with {lost} lost sample" in each for each in lines)
+            assert not lost or any(f"if the {lost} failed run" in each for each in lines)
         if name == "outcome":
             continue
         absent = int((file.ok & np.isnan(file.values[name])).sum())
         short = file.ok & (file.values["outcome"] != 1) & ~file.violating(name)
         for count, words in (
-            (absent, f"{name}: violations without a value, as the antenna did not get so far: "),
+            (absent, f"{name}: violations without a value (the antenna did not get that far): "),
             (int(short.sum()), f"{name}: "),
         ):
-            text = f"{words}{count}" if words.endswith("far: ") else (
-                f"{words}{count} of the {used - bad} that keep to it ended short of their goal"
+            text = f"{words}{count}" if words.endswith("far): ") else (
+                f"{words}{count} of the {used - bad} that meet it ended before their goal"
             )  # fmt: skip
             assert any(each.startswith(text) for each in lines) == (count > 0), text
 
@@ -312,7 +316,7 @@ def separates(file: File, rows: list[dict[str, str]]) -> None:
 def directed(area: float, inside: int, outside: int, row: dict[str, str]) -> None:
     """Larger or smaller, in so many of all pairs, in percent."""
     word, share = re.fullmatch(
-        r"(\w+) in (\S+) % of pairs", row["compared with the others"]
+        r"(\w+) in (\S+) % of pairs", row["compared with other samples"]
     ).groups()
     assert word == ("larger" if area >= 0.5 else "smaller")
     area = max(area, 1.0 - area)
@@ -373,7 +377,7 @@ def heads(file: File, text: str) -> str:
 
 def failing(file: File) -> int:
     """In how many ways samples failed, those of the same samples without a value taken as one."""
-    groups = [file.group(w) for w in ("stalled", "lost: timeout")]
+    groups = [file.group(w) for w in ("stalled", "failed: timeout")]
     found = {own.tobytes() for own, _ in groups if own.any()}
     return len(
         found | {file.violating(n).tobytes() for n in file.wanted if file.violating(n).any()}
@@ -428,7 +432,7 @@ def test_the_report_says_what_the_file_holds(told: tuple[File, list[str], str, l
             words = heads(file, page.found[name][0][0].lower() + page.found[name][0][1:])
             seen = list[int]()
             for row in page.rows(name):
-                sample, odd = int(row["sample"]), row["unusual in its inputs"]
+                sample, odd = int(row["sample"]), row["unusual inputs"]
                 worst_sample(file, words, sample, row["found"], odd, seen)
                 assert row["run it again"].endswith(f" {sample}")
                 assert row["player"] in (f"show {sample}", "-")
@@ -492,7 +496,7 @@ def statistics(file: File, rows: list[dict[str, str]]) -> None:
         if word not in ("minimum", "maximum"):
             assert row["in sample"] == row["its error bar"] == "-"
         assert row["used"] == str(len(values))
-        assert row["lost"] == str(file.lost.sum())
+        assert row["failed runs"] == str(file.lost.sum())
         assert row["no value"] == str(file.ok.sum() - len(values))
 
 
@@ -537,7 +541,7 @@ def test_the_closing_lines_of_a_campaign_say_it(
     run, peaks = int((file.ok | file.lost).sum()), set[str]()
     for line in others:
         if match := re.match(r"(deployed|stalled|timeout): (\d+) of (\d+)(.*)", line):
-            word = f"lost: {match[1]}" if match[1] == "timeout" else match[1]
+            word = f"failed: {match[1]}" if match[1] == "timeout" else match[1]
             own, _ = file.group(word)
             assert (int(match[2]), int(match[3])) == (int(own.sum()), run)
             named = re.search(r"samples? (\d+(?:, \d+)*)", match[4])

@@ -119,7 +119,7 @@ def test_the_page_has_no_figure_of_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     for name in ("asynchrony_max", "peak_tension", "deployment_time"):
         campaign[name] = "sample", 1.0 + dice.random(30)
     text = page(campaign, "runs/made")
-    assert "o input matters more than chance would explain" in text
+    assert "o significant input" in text
     assert 'id="figure-tornado"' not in text
 
 
@@ -148,7 +148,7 @@ def test_failures_and_violations_have_their_replay_commands(
     # Whatever fell short or violates something is told, and no sentence denies it.
     assert ("Every sample that has run reached its goal" in text) == (kind == "good")
     assert ("but not all keep to what is required" in " ".join(text.split())) == (kind == "good")
-    names = re.findall(r"<h3>(Violates .*|Stalled .*|Lost: .*)</h3>", text)
+    names = re.findall(r"<h3>(Violates .*|Stalled .*|Failed: .*)</h3>", text)
     assert len(names) == {"good": 1, "mixed": 3, "lost": 1}[kind]
     for k in KINDS[kind].get("failed", ()):
         assert f"broke </script> at 4 s in sample {k}" in cells
@@ -168,7 +168,7 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     at = cells.index("deployed")
     low, high = share_interval(4, 7)[0], share_interval(6, 7)[1]
     assert cells[at + 1 : at + 4] == [
-        "4 of 7 (2 lost)", f"{4 / 7:.2f}", f"{low:.2f} .. {high:.2f}"
+        "4 of 7 (2 failed)", f"{4 / 7:.2f}", f"{low:.2f} .. {high:.2f}"
     ]  # fmt: skip
     at = cells.index("outcome is deployed")
     assert cells[at + 6 : at + 9] == ["5", "1", "2"]
@@ -177,7 +177,7 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
 def test_samples_that_ended_alike_share_a_row_and_words_have_no_unit() -> None:
     campaign = made_campaign(30, failed=(2,), stalled=tuple(range(5, 30)))
     rows, more = tables.failures(campaign, "made")
-    assert [row[1] for row in rows] == ["lost: timeout", "stalled"]
+    assert [row[1] for row in rows] == ["failed: timeout", "stalled"]
     assert rows[1][0] == ", ".join(map(str, range(5, 25))) + " and 5 more"
     assert (rows[1][-1], more) == ("ringsim replay made 5", 0)
     assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "s"
@@ -243,7 +243,7 @@ def test_the_player_offers_median_worst_and_failures() -> None:
         "sample 6: worst by asynchrony_max, violates asynchrony_max <= 3 degree, deployed",
         "sample 4: violates deployment_time <= 40 s, violates outcome is deployed, "
         "violates asynchrony_max <= 3 degree, stalled",
-        "sample 2: lost: timeout", "sample 5: lost: timeout",
+        "sample 2: failed: timeout", "sample 5: failed: timeout",
     ]  # fmt: skip
     assert len(data["samples"][0]["times"]) == len(TIMES)
     assert data["samples"][3]["times"][-1] == 4.0
@@ -315,16 +315,19 @@ def test_the_verb(tmp_path: Path) -> None:
     for where, words in (
         (tmp_path / "none", "this folder holds no campaign.nc: there is no campaign in it"),
         (tmp_path / "gone", "there is no such file or folder"),
-        (tmp_path / "run.nc", "holds no campaign: give the folder"),
+        (tmp_path / "run.nc", "has no campaign: give the folder"),
         (tmp_path / "text.nc", "cannot be read as a netCDF file"),
     ):
         code, told = run(str(where), "--out", out)
         assert code == EXIT_BAD_INPUT
         assert told.startswith(f"{where}: {words}")
     code, told = run(str(tmp_path), "--out", out, "--analysis", str(tmp_path / "run.nc"))
-    assert (code, "holds no analysis" in told) == (EXIT_BAD_INPUT, True)
+    assert (code, "has no analysis" in told) == (EXIT_BAD_INPUT, True)
     code, told = run(str(tmp_path), "--out", str(tmp_path / "page.pdf"))
-    assert (code, told.endswith("the page is HTML: write page.html\n")) == (EXIT_BAD_INPUT, True)
+    assert (code, told.endswith("the page is HTML: give a name such as page.html\n")) == (
+        EXIT_BAD_INPUT,
+        True,
+    )
 
 
 @pytest.mark.usefixtures("_undrawn")
@@ -338,7 +341,7 @@ def test_verdicts_are_those_of_the_analysis_and_nothing_counts_again() -> None:
     at = cells.index("deployment_time <= 40 s")
     assert cells[at + 3 : at + 5] == ["not yet shown", f"{float(known.probability):.4g}"]
     assert cells[at + 6 : at + 9] == ["6", "1", "2"]
-    assert "as the antenna did not get so far: 1." in text
+    assert "(the antenna did not get that far): 1." in text
     # One table tells of a requirement, so that no other count can contradict it.
     assert "Met by" not in text
     assert sum(cell.startswith("deployment_time <=") for cell in cells) == 1
@@ -360,7 +363,7 @@ def test_what_matters_is_that_of_the_analysis() -> None:
         ["asynchrony_max by force", "0.75", "0.65 .. 0.85", "0.6", "0.5 .. 0.7", "7", "1"],
         ["asynchrony_max by rods", "0.25", "0.15 .. 0.35", "0.2", "0.1 .. 0.3", "7", "1"],
     ]  # fmt: skip
-    assert "no input seems to decide which (p = 0.4)" in gate.notes[0]
+    assert "this does not seem to depend on any input (p = 0.4)" in gate.notes[0]
 
 
 @pytest.mark.usefixtures("_undrawn")
@@ -382,7 +385,7 @@ def test_the_page_has_all_that_the_analysis_tells_of_main_numbers() -> None:
     at = cells.index("peak_tension with rods.young_modulus", at)
     assert cells[at + 1] == "1"
     assert any(cell.startswith("stalled: ") for cell in cells)
-    assert "stalled: the same samples as violates deployment_time" in text
+    assert "stalled: these are also the samples of violates deployment_time" in text
     at = cells.index("peak_tension", cells.index("dominates"))
     assert cells[at + 6] == "sampling (engines not measured)"
     assert "in the fidelity <b>frame</b>" in text
@@ -417,7 +420,7 @@ def test_few_samples_are_told_why_there_is_no_interval() -> None:
     for count, few in ((7, True), (8, False)):
         notes = statistics_table(analyse(made_campaign(count))).notes
         assert (
-            any("deviation takes 8, a median 6, the other quantiles 59" in n for n in notes) == few
+            any("deviation needs 8, a median 6, the other quantiles 59" in n for n in notes) == few
         )
 
 

@@ -161,8 +161,8 @@ class File:
     def group(self, words: str) -> tuple[np.ndarray, np.ndarray]:
         """Samples that words name, of which: the first of several names of the same samples."""
         first = words.split("; ")[0].strip()
-        if first == "lost" or first.startswith("lost: "):
-            codes = [c for c, w in LOSSES.items() if first in ("lost", f"lost: {w}")]
+        if first == "failed runs" or first.startswith("failed: "):
+            codes = [c for c, w in LOSSES.items() if first in ("failed runs", f"failed: {w}")]
             return np.isin(self.values["status"], codes), self.ok | self.lost
         if first.startswith("violates "):
             (name,) = [n for n in self.wanted if self.text(n) == first.removeprefix("violates ")]

@@ -135,13 +135,13 @@ def test_wrong_groups_are_refused(kind, wrong, words):
 def test_inputs_that_depend_on_each_other_need_a_common_group():
     pair = [Correlation(between=("force", "modulus"), coefficient=0.9)]
     alone, joined = Saltelli(samples=64), Saltelli(samples=64, groups={"a": ("force", "modulus")})
-    with pytest.raises(InputError, match=r"one of design\.groups"):
+    with pytest.raises(InputError, match=r"one group of design\.groups"):
         alone.table(FACTORS, pair, seed=1, folder=Path())
     drawn = joined.table(FACTORS, pair, seed=1, folder=Path())
     assert np.corrcoef(drawn["force"], drawn["modulus"])[0, 1] > 0.8
-    with pytest.raises(InputError, match="a design of kind morris has none"):
+    with pytest.raises(InputError, match=r"a morris design .*cannot have correlations"):
         Morris(samples=4).table(FACTORS, pair, seed=1, folder=Path())
-    with pytest.raises(InputError, match="moves inputs, and there are none"):
+    with pytest.raises(InputError, match="needs inputs"):
         alone.table({}, (), seed=1, folder=Path())
 
 

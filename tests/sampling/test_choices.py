@@ -139,7 +139,7 @@ def test_a_shared_value_is_one_axis_of_correlations_and_grids() -> None:
         ({"friction": FRICTION | {"shared": []}}, "friction is not a known key"),
         (
             {UPPER + "[2]": FRICTION | {"shared": []}, UPPER: FRICTION | {"shared": []}},
-            r"coefficient would replace what .*coefficient\[2\] has: put it before that",
+            r"coefficient would overwrite .*coefficient\[2\]: put it before that",
         ),
         ({"structure": {"kind": "discrete", "values": [{"sections": 3}]}}, "drawn as a whole"),
         (

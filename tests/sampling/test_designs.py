@@ -267,7 +267,7 @@ def test_inputs_that_the_scene_refuses_are_refused_before_anything_runs(inputs, 
                 ("net.stiffness", "loads.force", 0.9),
                 ("rods.young_modulus", "loads.force", -0.9),
             ],
-            "contradict",
+            "not compatible",
         ),
     ],
 )

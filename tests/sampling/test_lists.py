@@ -82,12 +82,18 @@ def test_lists_from_another_campaign_keep_their_arrays(tmp_path: Path) -> None:
         ('solver.step\n0.1\n"0,05"\n', 'row 2 .*solver.step: "0,05" has a decimal comma: .* 0.05'),
         ("solver.step\n0,1\n", r"row 1 has 2 values and must have 1.*decimals have points"),
         ("solver.step,case\n0.1,1\n", "column case is no scene path, and no label"),
-        ("solver.step,status\n0.1,good\n", "label status would be named status, which is taken"),
-        ("solver.step,sample\n0.1,first\n", "label sample would be named sample, which is taken"),
+        (
+            "solver.step,status\n0.1,good\n",
+            "label status would have the name status, which is in use",
+        ),
+        (
+            "solver.step,sample\n0.1,first\n",
+            "label sample would have the name sample, which is in use",
+        ),
         ("solver.stop,case\n0.1,good\n", r"column solver.stop: .*did you mean step\?"),
         (
             'cables.upper.winch.winding\n"{ kind = 3"\n',
-            "winding = { kind = 3: no table or list as TOML",
+            "winding = { kind = 3: not a valid TOML table",
         ),
     ],
 )

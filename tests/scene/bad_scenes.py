@@ -35,7 +35,7 @@ UNKNOWN_KEYS = [
     _scene("net", "net.neutral = 0.7", "net.neutral", "did you mean neutral_length?"),
     _scene("loads", "loads.forces = 0.015", "loads.forces is not", "did you mean force?"),
     _scene("table for another", "load.force = 0.015", "load is not", "did you mean loads?"),
-    _scene("key of a campaign", 'fidelity = "frame"', "fidelity", "behind --fidelity"),
+    _scene("key of a campaign", 'fidelity = "frame"', "fidelity", "for a run use --fidelity"),
     _scene("Celsius", "temperature.bar.value = -40.0", "at least 1 K; -40 C are 233.15 K"),
     _scene("capital letters", "loads.force = 1.0\nloads.Force = 1.0", "loads.Force", "mean force?"),
     _scene("solver", "solver.time_step = 0.1", "solver.time_step", "did you mean step?"),
@@ -45,7 +45,7 @@ UNKNOWN_KEYS = [
 WRONG_TYPES = [
     _scene("key of many parts", "a." * 300 + "a = 1", "line 2", "a key of more than 100 parts"),
     _scene("table of many parts", f"[{'a.' * 300}a]", "line 2", "a key of more than 100 parts"),
-    _scene("lists in lists", f"loads = {'[' * 200}{']' * 200}", "nest too deeply"),
+    _scene("lists in lists", f"loads = {'[' * 200}{']' * 200}", "nested too deeply"),
     _scene("number in quotes", 'structure.half_bar = "0.2889"', "structure.half_bar", "finite", "m"),
     _scene("fraction of a section", "structure.sections = 6.5", "structure.sections = 6.5", "whole"),
     _scene("whole number as float", "structure.sections = 6.0", "structure.sections", "whole"),
@@ -145,7 +145,7 @@ IMPOSSIBLE = [
            "gravity.vector = [0.0, 0.0, -9.81]\n"
            "[spacecraft]\nmass = 9.0\ninertia = [1.0, 1.0, 1.0]\n[boom]\nkind = 'rigid'",
            "gravity.vector", "with a spacecraft: the structure would fall",
-           "leave [spacecraft] out and hold it"),
+           "leave [spacecraft] out and fix the structure"),
     _scene("spacecraft on lines",
            "gravity.vector = [0.0, 0.0, -9.81]\n[offload]\n"
            "[spacecraft]\nmass = 9.0\ninertia = [1.0, 1.0, 1.0]\n[boom]\nkind = 'rigid'",
@@ -200,7 +200,7 @@ BROKEN = [
     _scene("value then table", "net = 3\n[net]\ndamping = 0.2", "not valid TOML"),
     _scene("colon", "solver: 3", "not valid TOML", "line 2"),
     _scene("number with comma", "structure.half_bar = 0,3", "not valid TOML", "line 2"),
-    _scene("nested beyond reason", f"loads.force = {'[' * 3000}", "nest too deeply"),
+    _scene("nested beyond reason", f"loads.force = {'[' * 3000}", "nested too deeply"),
     Bad("JSON", '{"name": "bad"}\n', ("not valid TOML", "line 1")),
     Bad("invalid UTF-8", b'name = "b\xe4d"\n', ("byte 10", "UTF-8")),
     Bad("UTF-16", 'name = "bad"\n'.encode("utf-16"), ("byte 1", "UTF-8")),

@@ -103,29 +103,30 @@ def test_faults_name_them() -> None:
     ("values", "words"),
     [
         ({f'{COEFFICIENT}["section 2 W"]': 0.002},
-         f'{COEFFICIENT}["section 2 W"]: there is no place of that name (did you mean '
+         f'{COEFFICIENT}["section 2 W"]: there is no pulley or span of that name (did you mean '
          '"section 2 V"?)'),
         # Its end, which holds the cable.
         ({f'{COEFFICIENT}["section 2 second hinge"]': 0.002},
          f'{COEFFICIENT}["section 2 second hinge"]: the cable is fixed there and has no pulley: '
-         'the last is "section 2 V"'),
+         'the last pulley is "section 2 V"'),
         ({COEFFICIENT: {"default": 1e-4, "section 2 second hinge": 0.002}},
          f'{COEFFICIENT}."section 2 second hinge": the cable is fixed there'),
         ({"cables.upper.end": "last", f'{COEFFICIENT}["section 1 first hinge"]': 0.002},
-         'fixed there and has no pulley: the last is "section 1 V"'),
+         'fixed there and has no pulley: the last pulley is "section 1 V"'),
         ({"faults": [{"kind": "jammed-pulley", "time": 1.0, "pulley": "section 2 second hinge"}]},
          'faults[1].pulley = "section 2 second hinge": the cable is fixed there'),
         ({"faults": [{"kind": "cut", "time": 1.0}]},
-         'faults[1].kind = "cut" is not a kind of it (did you mean cut-cable?)'),
+         'faults[1].kind = "cut" is not an available kind (did you mean cut-cable?)'),
         ({f'{COEFFICIENT}["drum"]': 0.002}, 'the first is "section 1 first hinge"'),
         ({'rods.young_modulus["section 1"]': 1e11}, "or one with its section: name[1]"),
-        ({COEFFICIENT: {"section 2 V": 0.002}}, "coefficient.default is missing: give it for all"),
+        ({COEFFICIENT: {"section 2 V": 0.002}},
+            "coefficient.default is missing: give the value for all"),
         ({COEFFICIENT: {"default": 1e-4, "section 3 V": 0.002}},
-         f'{COEFFICIENT}."section 3 V": there is no place of that name (did you mean'),
+         f'{COEFFICIENT}."section 3 V": there is no pulley or span of that name (did you mean'),
         ({COEFFICIENT: {"default": "x"}}, "must be a finite number in m"),
         ({"faults": [{"kind": "jammed-pulley", "time": 1.0, "pulley": "section 2 w"}]},
-         'faults[1].pulley = "section 2 w": there is no place of that name (did you mean '
-         '"section 2 V"?)'),
+         'faults[1].pulley = "section 2 w": there is no pulley or span of that name (did you '
+         'mean "section 2 V"?)'),
         ({"faults": [{"kind": "cut-cable", "time": 1.0, "span": "section 2 V"}]},
          'did you mean "section 2 V to second hinge"?'),
         ({"faults": [{"kind": "cut-cable", "time": 1.0, "cable": 3, "span": "section 2 V"}]},
@@ -168,7 +169,7 @@ def test_names_do_not_depend_on_the_order_in_which_values_are_given() -> None:
 )
 def test_pulleys_that_would_become_others_are_refused(values: dict, what: str) -> None:
     scene = load_scene("truss2").with_values(values)
-    with pytest.raises(InputError, match=f"those of .*{what} would be others"):
+    with pytest.raises(InputError, match=f"the values of .*{what} would move to other pulleys"):
         scene.with_values({"cables.upper.end": "last"})
     assert scene.with_values(
         {"cables.upper.end": "last"} | {"faults": [], "cables.upper.friction.coefficient": 0.001}

@@ -90,7 +90,7 @@ def test_rigid_rods_are_no_fidelity_any_more(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(CAMPAIGN.replace('"frame"', '"ideal"'))
     for line in (refused("run", "truss2", "--fidelity", "ideal"), refused("campaign", path)):
-        assert line.endswith('no fidelity any more: choose fidelity = "frame"')
+        assert line.endswith('no longer available: choose fidelity = "frame"')
     with pytest.raises(InputError, match=r'fidelity = "ideal": .* choose fidelity = "frame"'):
         simulate("truss2", fidelity="ideal")
 
@@ -255,10 +255,10 @@ def test_places_without_a_campaign_are_told_apart(tmp_path: Path) -> None:
     for verb, place, named in (
         ("status", file, "this is a file"),
         ("merge", tmp_path / "nowhere", "there is no such folder"),
-        ("status", tmp_path, "no campaign in this folder: design.nc is not there"),
+        ("status", tmp_path, "no campaign in this folder: it has no design.nc"),
     ):
         line = refused(verb, place)
-        assert f"{place}: {named}: give the folder that ringsim campaign named" in line
+        assert f"{place}: {named}: give the folder that ringsim campaign has written" in line
     assert "there is no such file" in refused("campaign", tmp_path / "nowhere.toml")
 
 

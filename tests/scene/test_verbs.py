@@ -207,6 +207,6 @@ def test_names_that_a_locale_cannot_write_are_refused_with_the_cure(tmp_path: Pa
     )  # fmt: skip
     assert done.returncode == 2
     line = done.stderr.decode("ascii", "replace")
-    assert "a name of a file or folder has letters that this locale" in line
+    assert "a file or folder has a name that this locale" in line
     assert "set PYTHONUTF8=1" in line
     assert "Traceback" not in line

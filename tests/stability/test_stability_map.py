@@ -31,7 +31,7 @@ from ringsim.variables import Cause, Fate, Status
 
 pytestmark = pytest.mark.quick
 
-NEWTON = "the solver gave up at 1 s after 9 reductions of the step: reduce solver.step"
+NEWTON = "the solver stopped at 1 s after 9 step reductions: reduce solver.step"
 ENDS = {
     "all V-joints have reached 180 deg": (Status.OK, Cause.NONE, Fate.DEPLOYED),
     "solver.end_time = 4 s was reached with 0 of 4 V-joints locked": (
@@ -148,11 +148,11 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     whole = joined([(WORDS, cells(*ENDS)), (WORDS | {"title": "other"}, cells(GOOD, restarts=[1]))])
     text = to_markdown(whole)
     assert "7 cells in 2 panels: 3 ended, 2 ok, 2 wrong" in text
-    assert "1 of the ok ones after a new start" in summary(whole)
+    assert "1 of the ok cells after a restart" in summary(whole)
     assert NEWTON in text
     figure = stability(whole)
     legend = [entry.get_text() for entry in figure.legends[0].get_texts()]
-    assert legend == ["ok", "r  ok, after a new start", "t  cut off", "N  Newton",
+    assert legend == ["ok", "r  ok, after a restart", "t  cut off", "N  Newton",
                       "T  time limit", "!  wrong"]  # fmt: skip
     assert "Stiffness (N)" in [axes.get_xlabel() for axes in figure.axes]
 

@@ -113,7 +113,7 @@ def test_the_same_command_goes_on_without_running_anything_again(mapped) -> None
 @for_each(
     ("over", "wanted"),
     [
-        (["rods.damping=1..2"], "--over rods.damping=1..2: has no partner"),
+        (["rods.damping=1..2"], "--over rods.damping=1..2: a panel needs two axes"),
         (["rods.damping=1", STOP], "--over rods.damping=1: must read PATH=LOW..HIGH"),
         (["rods.damping=a..b", STOP], "--over rods.damping=a..b: must read PATH=LOW..HIGH"),
         (["rods.damping=2..1", STOP], "LOW = 2 must be below HIGH = 1"),
@@ -123,7 +123,7 @@ def test_the_same_command_goes_on_without_running_anything_again(mapped) -> None
         (["solver.step=1..90", STOP], "solver.step = 90.0 s must not exceed end_time = 45.0 s"),
         (["rods.kind=1..2", STOP], "known: ancf, geometrically-exact"),
         (["structure.sections=1.5..3", STOP], "structure.sections takes whole numbers only"),
-        (["net.*.stiffness=1..2", STOP], "* stands for each cable of a scene"),
+        (["net.*.stiffness=1..2", STOP], "* stands for every cable"),
         ([STOP, STOP], "both axes of panel 1 vary stop.stiffness"),
         (
             ["record.interval=1..9", "solver.end_time=5..20"],
@@ -167,7 +167,7 @@ def test_default_axes_stand_around_what_the_scene_has(name) -> None:
 
 def test_default_axes_leave_out_what_a_scene_lacks() -> None:
     plain = load_scene("ring18").with_values({"stop": "none", "rods.damping": 0.0})
-    with pytest.raises(InputError, match="holds none of the default pairs"):
+    with pytest.raises(InputError, match="has none of the default pairs"):
         panels_over(plain, [], points=3)
 
 

@@ -68,7 +68,7 @@ def standing(campaign: xr.Dataset) -> tuple[xr.Dataset, str]:
     """The samples that stand for the population, as statistics take them, and a word on others."""
     found = population_of(campaign)
     left = found.sizes["sample"] < campaign.sizes["sample"]
-    return found, " Of blocks the samples A and B, which stand for the population." if left else ""
+    return found, " Only the samples A and B of each block are used." if left else ""
 
 
 def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:

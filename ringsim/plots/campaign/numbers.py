@@ -222,7 +222,7 @@ def convergence(campaign: xr.Dataset) -> Figure:
         known, ends = judged(campaign, name, each, placed)
         axes.fill_between(known, *ends.T, color=style.GREEN, alpha=0.2, linewidth=0.0,
                           label="bounds of the probability")  # fmt: skip
-        axes.plot(counts, share, color=style.GREEN, label="share that keeps to it")
+        axes.plot(counts, share, color=style.GREEN, label="share that meets it")
         axes.axhline(each.probability, color=style.INK, linewidth=1.1, linestyle=(0, (4, 3)),
                      label="required probability")  # fmt: skip
         axes.set_ylim(max(0.0, min(share.min(), ends.min()) - 0.02), 1.02)
@@ -232,9 +232,9 @@ def convergence(campaign: xr.Dataset) -> Figure:
     most = max((len(values_of(campaign, name)[0]) for name in names), default=0)
     caption = f"{told(campaign, most)}.{blocks}{flat}"
     if not placed.has_intervals:
-        caption += " No interval of the mean: the points of this design are not independent."
+        caption += " No interval of the mean: the samples of this design are not independent."
     if wanted:
-        caption += " Bounds: each with the confidence that the verdict takes."
+        caption += " Bounds: each with the confidence of the verdict."
     head(figure, campaign, "Convergence", caption)
     return figure
 
@@ -314,9 +314,11 @@ def by_input(campaign: xr.Dataset) -> Figure:
             axes.set_ylabel(style.label(campaign[name], width=30), fontsize=9)
     legend(figure, panels[:1], 4)
     lost = int((height == foot).sum())
-    below = f"; {lost} without the number stand below the line" if lost else ""
+    below = f"; the {lost} without this output are below the line" if lost else ""
     note = (
-        " Inputs of many places by their mean." if any(campaign[n].ndim > 1 for n in names) else ""
+        " Inputs with many values (one a section, pulley, ...) by their mean."
+        if any(campaign[n].ndim > 1 for n in names)
+        else ""
     )
     if others > 0:
         note += f" Not drawn: {others} inputs whose rank correlation with the number is smaller."
@@ -371,7 +373,7 @@ def rare_event(campaign: xr.Dataset) -> Figure:
     lines = [each for each in approach(campaign) if len(each[0])]
     for number, (places, shares) in enumerate(lines):
         axes.plot(places, shares, color=style.BLUE, marker="o", markersize=4, linewidth=1.0,
-                  alpha=0.7, label="" if number else "levels, a line a replicate")  # fmt: skip
+                  alpha=0.7, label="" if number else "levels, one line per replicate")  # fmt: skip
     target = design.sign * design.target
     axes.axvline(target, color=style.VERMILLION, linestyle=(0, (5, 2)), linewidth=1.3)
     probability, (low, high) = found["tail_probability"][1], found["tail_probability_interval"][1]

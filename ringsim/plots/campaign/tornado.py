@@ -35,7 +35,7 @@ from ringsim.plots import style
 from ringsim.plots.campaign.frame import MOST_PANELS, head, in_lines, legend, looks_of
 from ringsim.plots.registry import picture
 from ringsim.stepping.instant import Array
-from ringsim.tables import unit_behind
+from ringsim.tables import counted, unit_behind
 
 MEASURES = {
     "total_index": "Total Sobol' index",
@@ -52,7 +52,7 @@ _INSIDE = {
     "given_data_index": ("partial_rank_correlation", "partial rank correlation"),
 }
 """What a second, thinner bar shows beside it."""
-_BY_CHANCE = "the largest by chance in one case of 20"
+_BY_CHANCE = "exceeded by chance in one case of 20"
 _MOST = 8
 _NONE = np.empty(0), np.empty((0, 2)), np.empty(0), np.empty((0, 2))
 
@@ -131,12 +131,14 @@ def _counted(one: xr.Dataset, *, blocks: bool) -> str:
     """Samples or blocks that indices of an output are from, or why it has none."""
     if one["missing_by_inputs"].item() < UNLIKELY:
         chance = max(one["missing_by_inputs"].item(), 1e-4)
-        why = f"{one['missing'].item()} samples have no value,\nby their inputs"
-        return f"no index: {why} (p = {chance:.1g} at most)"
+        why = (
+            f"{counted(one['missing'].item(), 'sample')} without a value,\nwhich depends on inputs"
+        )
+        return f"no index: {why} (p <= {chance:.1g})"
     if not MEASURES.keys() & set(one):
         return ""
     of = "blocks" if blocks else "samples"
-    return f"{of}: {one['index_used'].item()} used, {one['index_lost'].item()} lost"
+    return f"{of}: {one['index_used'].item()} used, {one['index_lost'].item()} left out"
 
 
 def _chance(analysis: xr.Dataset, measure: str, output: str, samples: int) -> Array | None:
@@ -196,15 +198,15 @@ def explained(campaign: xr.Dataset) -> bool:
     "campaign", 90, "Which inputs matter for each main number, with intervals", applies=explained
 )
 def tornado(campaign: xr.Dataset) -> Figure:
-    """A panel a main number, a bar an input or group; whiskers are intervals of 95 %."""
+    """A panel a main number, a bar an input or group; whiskers are 95 % intervals."""
     # Those that something is required of first: a page has no room for all.
     wanted = required_by(campaign.attrs)
     every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
     quiet = [name for name, bars in every if bars.measure and not bars.names]
     every = [each for each in every if each[0] not in quiet]
     found = every[:MOST_PANELS]
-    found = found or [("", Bars("", [], *_NONE, np.nan, "nothing beyond chance" if quiet else
-                                "no measure is known"))]  # fmt: skip
+    found = found or [("", Bars("", [], *_NONE, np.nan, "no significant input" if quiet else
+                                "no sensitivity measure"))]  # fmt: skip
     rows = max(len(bars.names) for _, bars in found)
     figure, panels, _ = style.new_panels(len(found), 5.2, 1.3 + 0.34 * rows, 1.1, most=2)
     certain, uncertain = False, False
@@ -223,19 +225,19 @@ def tornado(campaign: xr.Dataset) -> Figure:
             axes.set_xlabel(f"{MEASURES[bars.measure]}{unit}{beside}{below}", fontsize=9)
     if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
         legend(figure, panels)
-    whiskers = "Whiskers: intervals of 95 %." if certain else ""
+    whiskers = "Whiskers: 95 % intervals." if certain else ""
     if uncertain and not certain:
         whiskers = "The design allows no intervals."
     if certain and uncertain:
-        whiskers += " Bars without: the interval is not known, as of a perfect correlation."
+        whiskers += " Bars without whiskers: interval not known."
     most = max((len(values_of(campaign, name)[0]) for name in scalars(campaign)), default=0)
     beyond = any(np.isfinite(bars.chance) for _, bars in found)
-    of = f"The longest {_MOST} bars at most{', of those that chance would not explain' * beyond}."
+    of = f"The longest {_MOST} bars at most{', significant inputs only' * beyond}."
     if any((np.abs(bars.values) < bars.chance).any() for _, bars in found):
-        of += " Where an index ends before the dashed line, the rank correlation is beyond chance."
+        of += " Where an index ends before the dashed line, the rank correlation is significant."
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", whiskers, of]))
     if quiet:
-        caption += f" No input matters more than chance would explain for {', '.join(quiet)}."
+        caption += f" No significant input for {', '.join(quiet)}."
     if others := [name for name, _ in every[MOST_PANELS:]]:
         caption += f" Not drawn: {', '.join(others)}."
     head(figure, campaign, "What matters", caption)

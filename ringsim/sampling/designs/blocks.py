@@ -142,9 +142,7 @@ class Grouped(Design):
     ) -> dict[str, Values]:
         """As of every design; InputError without inputs, which leave nothing to move."""
         if not factors:
-            raise InputError(
-                f"design.kind = {kind_of(self)} moves inputs, and there are none: give [inputs]"
-            )
+            raise InputError(f"design.kind = {kind_of(self)} needs inputs: give [inputs]")
         return super().table(factors, correlations, seed=seed, folder=folder)
 
 
@@ -286,7 +284,7 @@ class Saltelli(Grouped, Replicated):
         for pair, first, second in pairs_of(list(factors), correlations):
             if group_of[first] != group_of[second]:
                 raise InputError(
-                    f"correlations.between = {list(pair.between)}: Sobol' indices need groups that "
-                    "do not depend on each other: put both inputs into one of design.groups"
+                    f"correlations.between = {list(pair.between)}: Sobol' indices need "
+                    "independent groups: put both inputs into one group of design.groups"
                 )
         return super().table(factors, correlations, seed=seed, folder=folder)

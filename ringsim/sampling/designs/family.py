@@ -51,8 +51,8 @@ class Design(Model):
         """
         if correlations and not self.correlated:
             raise InputError(
-                f"correlations: a design of kind {kind_of(self)} has none, because it moves each "
-                "input by itself; use another design"
+                f"correlations: a {kind_of(self)} design changes each input by itself and cannot "
+                "have correlations: use another design"
             )
         if not factors:
             return {}

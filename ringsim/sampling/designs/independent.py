@@ -57,7 +57,7 @@ class RandomDesign(Design):
     """Plain Monte Carlo: sample i depends on the campaign's seed and on i alone."""
 
     gone: ClassVar[dict[str, str]] = {
-        "replicates": "samples of a random design are independent as they are; leave it out",
+        "replicates": "samples of a random design are already independent: leave it out",
     }
     independent: ClassVar[bool] = True
     extendable: ClassVar[bool] = True
@@ -98,7 +98,7 @@ class Replicated(Design):
             near = max(self.samples - left, self.replicates)
             raise ValueError(
                 f"samples = {self.samples} must be a multiple of replicates = {self.replicates}, "
-                f"for example {near}: every replicate has as many samples"
+                f"for example {near}: all replicates have the same number of samples"
             )
         return self
 
@@ -197,7 +197,7 @@ class Listed(Design):
         """Values by path; see :meth:`Design.table`."""
         if factors or correlations:
             raise InputError(
-                "inputs: a listed design takes them from its file; leave out inputs and "
+                "inputs: a listed design has its inputs in its file: leave out inputs and "
                 "correlations"
             )
         path = folder / self.file
@@ -280,7 +280,7 @@ class OneAtATime(Design):
 
     Levels are those of a grid: all values of a discrete input, a uniform one from end to end in
     equal steps, of unbounded ones the middles of intervals of equal probability.  An input with
-    ``each_section`` moves place by place: one bad part at each place in turn.  Interactions of
+    ``each_section`` changes in one section at a time: one bad part in each.  Interactions of
     inputs stay unseen.
     """
 

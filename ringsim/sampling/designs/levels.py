@@ -42,7 +42,7 @@ class SubsetSimulation(Design):
     """Levels after which nothing rarer is looked for."""
     check: Annotated[int, Field(ge=0)] = 0
     """So many runs at most are repeated with the full model in the end: half of them are those
-    outside the event that are nearest to it; the others are in the event, lost, or short of their
+    outside the event that are nearest to it; the others are in the event, failed, or short of their
     goal, evenly spread over all."""
     _known: Array = PrivateAttr(default_factory=lambda: np.empty(0))
 
@@ -54,7 +54,7 @@ class SubsetSimulation(Design):
             raise ValueError(f"of = {instead_of(self.of, sense)}")
         if self.of not in known:
             raise ValueError(
-                f"of = {self.of} is no output with one number a run "
+                f"of = {self.of} is not an output with one number per run "
                 f"({known_or_nearest(self.of, known)})"
             )
         if (self.above is None) == (self.below is None):
@@ -66,8 +66,8 @@ class SubsetSimulation(Design):
             )
         if left := self.samples % length:
             raise ValueError(
-                f"samples = {self.samples} must be a multiple of 1 / share = {length}, for example "
-                f"{self.samples - left or length}: all chains are of one length"
+                f"samples = {self.samples} must be a multiple of 1 / share = {length}, for "
+                f"example {self.samples - left or length}: all chains have the same length"
             )
         return self
 
@@ -91,8 +91,8 @@ class SubsetSimulation(Design):
     def runs_told(self, runs: int) -> str:
         """How many runs the design has, in words, of so many that are known by now."""
         if self.ended:
-            return f"{runs}, and all levels have run"
-        return f"{runs} so far: their results tell which come next; {self.most_runs} at most"
+            return f"{runs}, all levels completed"
+        return f"{runs} so far, at most {self.most_runs}: results decide on further ones"
 
     def responses(self, values: Array, lost: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Array:
         """Responses of runs by the output, NaN where it has no value, and which runs were lost.
