@@ -77,7 +77,7 @@ def test_the_report_shows_the_tail_and_no_means_of_its_samples(tail, monkeypatch
     assert f"<td>{found.tail_probability.item():.3g}</td>" in text
     assert f'<td class="range">{low:.2g} .. {high:.2g}</td>' in text
     assert 'id="figure-rare_event"' in text
-    assert "A design of kind subset-simulation stands for no population" in text
+    assert "Samples of a subset-simulation design do not represent a population" in text
     assert 'id="figure-convergence"' not in text
     for (places, shares), each in zip(
         approach(campaign), found.tail_replicate_probability.values, strict=True
@@ -95,7 +95,7 @@ def test_plan_and_status_tell_that_more_runs_follow(tail, bench):
     write(bench)
     printed = bench.run(*START, "--dry-run")
     assert "160 so far, at most 800: results decide on further ones" in printed
-    assert re.search(r"predicted +about .* for these, up to .* with all levels$", printed.strip())
+    assert re.search(r"predicted +about .* for these, up to .* for all levels$", printed.strip())
     assert re.search(r"runs +\d+, all levels completed", tail.run("status", "out"))
     assert "nothing is left to run" in tail.run(*START, "--dry-run")
 
@@ -157,5 +157,5 @@ def test_runs_in_the_event_are_repeated_with_the_full_engine(bench, tail):
 
 def test_parts_and_retries_are_refused(bench):
     write(bench)
-    assert "leave it out" in bench.run(*START, "--part", "1/2", code=2)
-    assert "leave it out" in bench.run(*START, "--retry-failed", code=2)
+    assert "leave --part out" in bench.run(*START, "--part", "1/2", code=2)
+    assert "leave --retry-failed out" in bench.run(*START, "--retry-failed", code=2)

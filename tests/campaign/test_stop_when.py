@@ -55,7 +55,7 @@ def test_it_ends_at_a_look_and_tells_why(ended):
     words = f"ended the campaign after {count} of at most 240 samples"
     for printed in (ended.printed, ended.run("merge", "out"), ended.run("analyse", "out")):
         assert words in printed
-        assert "hold at all looks at once" in printed
+        assert "allow for these repeated checks" in printed
         assert " met " in printed
     assert f"ended          {count} of at most 240 samples" in ended.run("status", "out")
     assert finished(ended.folder / "out") == set(range(count))
@@ -137,14 +137,17 @@ def test_looks_are_whole_replicates():
 @for_each(
     ("change", "words"),
     [
-        (('kind = "random"', 'kind = "latin-hypercube"'), "design of kind latin-hypercube"),
+        (
+            ('kind = "random"', 'kind = "latin-hypercube"'),
+            "a latin-hypercube design needs all its samples",
+        ),
         (('kind = "random"', 'kind = "sobol"'), "design.replicates = 8"),
         (('requirement = "dep', 'requirement = "de'), "not among the requirements"),
         ((", half_width = 0.6", ""), "needs half_width"),
         (('{ of = "deployment_time"', '{ of = "opening_angle"'), "has a value for each plane"),
         (('{ of = "dep', '{ requirement = "x", of = "dep'), "needs either"),
         (("stop_when = [", "set_aside = ["), "set_aside"),
-        (('of = "deployment_time"', 'of = "peak_tension"'), "it has no cables"),
+        (('of = "deployment_time"', 'of = "peak_tension"'), "the scene has no cables"),
     ],
 )
 def test_rules_that_cannot_be_followed_are_refused(change, words, tmp_path):
