@@ -280,7 +280,7 @@ def test_budget_says_which_error_dominates() -> None:
             "status": ("sample", np.zeros(100, dtype=int)),
             "deployment_time": ("sample", values, {"units": "s"}),
             "deployment_time_error": ("sample", bars, {"units": "s"}),
-            "asynchrony_max": ("sample", 5.0 + 1e-3 * values, {"units": "degree"}),
+            "asynchrony_max": ("sample", 5.0 + 3e-2 * values, {"units": "degree"}),
             "asynchrony_max_error": ("sample", bars, {"units": "degree"}),
             "energy_error": ("sample", values),
         },

@@ -72,7 +72,7 @@ def test_a_folder_that_another_build_began_is_refused_with_both_names(again, cop
     (line,) = copied.run(*START, *again, code=2).splitlines()
     assert "ringsim 9.9 (sources 0123456789ab, commit fade) began this campaign" in line
     assert (
-        f"this is ringsim {build.provenance()['ringsim_version']} (sources {build.sources()}"
+        f"you run ringsim {build.provenance()['ringsim_version']} (sources {build.sources()}"
         in line
     )
     assert "choose another folder with --out" in line

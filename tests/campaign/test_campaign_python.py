@@ -122,7 +122,7 @@ def test_ctrl_c_stops_it_and_the_same_call_goes_on(
     runs = interrupting(monkeypatch, at=2)
     with pytest.raises(KeyboardInterrupt):
         small().run(workers=0)
-    assert "the same command goes on" in capsys.readouterr().err
+    assert "run the same command again to continue" in capsys.readouterr().err
     assert len(runs) == 2
     partly = open_campaign("runs/small")
     assert (partly["status"] == 0).sum() == 2
@@ -147,7 +147,7 @@ def test_verbs_merge_what_was_interrupted_but_not_what_runs(
         assert not (folder / "campaign.nc").exists()
     few = [each for each in figures.PICTURES if each.name == "distributions"]
     monkeypatch.setattr(figures, "PICTURES", few)
-    line = f"{folder}: merged its results into campaign.nc first, 2 samples not run"
+    line = f"{folder}: merged its results into campaign.nc, 2 samples not run"
     for verb in ("analyse", "export", "report", "plot", "compare"):
         (folder / "campaign.nc").unlink(missing_ok=True)
         others = [str(folder)] if verb == "compare" else []
@@ -236,5 +236,5 @@ def test_replay_refuses_checks_that_a_campaign_does_not_have() -> None:
     small().run(workers=0)
     done = CliRunner().invoke(cli, ["replay", "runs/small", "1", "--check"])
     assert done.exit_code == 2
-    told = "--check: the samples of runs/small have no checks (check_every): leave it out"
+    told = "--check: runs/small has no checks with the full engine (check_every): leave it out"
     assert told in done.output
