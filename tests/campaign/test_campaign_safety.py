@@ -111,7 +111,7 @@ def test_folder_with_other_files_is_refused(bench):
     (bench.folder / "out").mkdir()
     (bench.folder / "out" / "thesis.tex").touch()
     printed = bench.run("campaign", bench.write(), "--out", "out", code=2)
-    assert "thesis.tex and no campaign" in printed
+    assert "has other files (thesis.tex) and no campaign" in printed
 
 
 def test_file_where_the_folder_should_be_is_refused(bench):
@@ -146,7 +146,7 @@ def test_stop_signal_ends_the_campaign_and_it_goes_on_later(number, bench):
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
     assert f"stopped by {number.name}" in printed
-    assert "the same command goes on" in printed
+    assert "run the same command again to continue" in printed
     assert not (bench.folder / "out" / "campaign.nc").exists()
     bench.run(*start, solver="fake_solver:slow")
     assert (bench.result("out").status == 0).all()
@@ -195,7 +195,7 @@ def test_stop_signal_reaches_all_ranks(bench, mpi):
     process.send_signal(signal.SIGUSR1)
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
-    assert printed.count("the same command goes on") == 1
+    assert printed.count("run the same command again to continue") == 1
     bench.run(*start, solver="fake_solver:slow")
     assert (bench.result("out").status == 0).all()
 
