@@ -196,7 +196,7 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
 
 FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {"full": run, "frame": run_frame}
 """What answers a scene: the full multibody model; or the same rods, joints and cables in joint
-coordinates, several times as fast."""
+coordinates, some thirty times as fast."""
 
 
 def simulate(

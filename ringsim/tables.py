@@ -72,13 +72,15 @@ def counted(number: int, noun: str) -> str:
 
 
 def known_to(
-    number: str, error: float, form: str = ".2g", exact: float | None = None
+    number: str, error: float, form: str = ".2g", exact: float | None = None, least: int = 2
 ) -> str:  # fmt: skip
     """A number in words without the digits beyond those that its error has in print, two at most;
-    rounded once where it is known ``exact``.
+    rounded once where it is known ``exact``.  The ``least`` digits stay, however large the error.
 
     >>> known_to("32.4713", 0.02), known_to("32.4713", 0.023), known_to("1234", 170.0)
     ('32.47', '32.471', '1230')
+    >>> known_to("3.579", 190.0)
+    '3.6'
     >>> known_to("3.2", 0.001), known_to("3.2", math.nan)
     ('3.2', '3.2')
     """
@@ -86,6 +88,7 @@ def known_to(
         return number
     bar, held = Decimal(f"{error:{form}}"), Decimal(number)
     own, last = (each.adjusted() - len(each.as_tuple().digits) + 1 for each in (held, bar))
+    last = min(last, held.adjusted() + 1 - least) if least else last
     if own >= last:
         return number
     return f"{Decimal(number if exact is None else exact).quantize(Decimal((0, (1,), last))):f}"
@@ -104,7 +107,10 @@ def interval_text(low: float, high: float, digits: int = 4) -> str:
     """
     if not (math.isfinite(low) or math.isfinite(high)):
         return "-"
-    return " .. ".join(estimate_text(end, low, high, digits) for end in (low, high))
+    half = 0.5 * (high - low)
+    return " .. ".join(
+        known_to(number_text(end, digits), half, ".1e", end, least=0) for end in (low, high)
+    )
 
 
 def estimate_text(value: float, low: float, high: float, digits: int = 4) -> str:

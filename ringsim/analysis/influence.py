@@ -270,6 +270,25 @@ def separating(analysis: xr.Dataset, samples: int) -> Iterator[tuple[str, list[i
         yield str(group), [int(k) for k in order if names[k] in kept]
 
 
+RANKS = {"partial_": "partial rank correlation", "": "rank correlation"}
+"""How names of rank correlations begin, and what these are."""
+
+
+def standing_out(analysis: xr.Dataset, output: str, samples: int) -> tuple[Array, Mask]:
+    """Rank correlations of all inputs, partial where there are such, and which of them stand out
+    of what the largest reaches by chance in so many samples; shape (input,) both.
+    """
+    (values, ends), (plain, plain_ends) = (
+        (analysis[name].values, analysis[f"{name}_interval"].values)
+        for name in (f"{output}_{word}rank_correlation" for word in RANKS)
+    )
+    partial = np.isfinite(values)
+    values, ends = np.where(partial, values, plain), np.where(partial[:, None], ends, plain_ends)
+    held = np.where(partial, analysis["inputs_held"].values, 0)
+    chance = largest_by_chance(samples, held, len(values))
+    return values, beyond(values, ends, chance)
+
+
 def beyond(values: Array, ends: Array, chance: Array | float) -> Mask:
     """Which values are larger than the largest of all by chance, and if they have intervals leave
     out zero by these, too.

@@ -6,16 +6,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis import indices
 from ringsim.analysis.design import strongest
 from ringsim.analysis.indices import UNLIKELY
 from ringsim.analysis.influence import (
+    RANKS,
     apart,
-    beyond,
     confounding_notes,
     partners,
     places_in,
     separating,
+    standing_out,
 )
 from ringsim.analysis.intervals import LEVEL, is_moment, quantities
 from ringsim.analysis.worst import marked
@@ -249,8 +249,7 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
             yield (
                 f"no sensitivity index for {who}: whether a sample has a value depends on the "
                 f"inputs ({counted(count, 'sample')} without, {p}), so the rest is not "
-                f"representative: see what separates them, {', '.join(cures)}, or narrow the "
-                "inputs"
+                f"representative: {', '.join(cures)}, or narrow the inputs"
             )
         else:
             yield (
@@ -347,7 +346,6 @@ def _second(analysis: xr.Dataset) -> Table:
 
 _MOST_IN_SHORT = 3
 """Inputs that are told for each output."""
-_RANKS = {"partial_": "partial rank correlation", "": "rank correlation"}
 """Of rank correlations the one that holds the other inputs first, with their heads."""
 _CHANCE = {"given_data_index": "chance_level"}
 """Measures that chance lifts, and how far."""
@@ -395,7 +393,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
     if quiet:
         notes.append(f"no significant input for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
-    head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
+    head = ("what matters for", "input", index, "95 % interval", *RANKS.values())
     return marked(Table(head, rows, notes, left=2), analysis, 1)
 
 
@@ -413,7 +411,7 @@ def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]
     for output in [n for n in quantities() if n in indexed or n in known] + groups:
         names = list(indexed.get(output, ()))
         if output in known and (output not in indexed or measure in _CHANCE):
-            values, listed = standing_out(analysis, output)
+            values, listed = standing_out(analysis, output, _samples(analysis, output))
             order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
             ranked = analysis["input"].values[order[listed[order]]].astype(str).tolist()
             if output in indexed:
@@ -475,7 +473,7 @@ def _cleared(analysis: xr.Dataset, output: str, found: list[str]) -> tuple[list[
     if not paired or "factor" in analysis.dims or output not in _correlated(analysis):
         return found, []
     partial = analysis[f"{output}_partial_rank_correlation"].values
-    clear = np.isnan(partial) | standing_out(analysis, output)[1]
+    clear = np.isnan(partial) | standing_out(analysis, output, _samples(analysis, output))[1]
     stands = dict(zip(analysis["input"].values.tolist(), clear.tolist(), strict=True))
     kept, others = list[str](), list[str]()
     for name in found:
@@ -497,28 +495,16 @@ def _correlated(analysis: xr.Dataset) -> list[str]:
     return [name for name in quantities() if f"{name}_rank_correlation" in analysis]
 
 
-def standing_out(analysis: xr.Dataset, output: str) -> tuple[Array, NDArray[np.bool_]]:
-    """Rank correlations of all inputs, partial where there are such, and which of them stand out
-    of what the largest reaches by chance; shape (input,) both.
-    """
-    (values, ends), (plain, plain_ends) = (
-        (analysis[name].values, analysis[f"{name}_interval"].values)
-        for name in (f"{output}_{word}rank_correlation" for word in _RANKS)
-    )
-    partial = np.isfinite(values)
-    values, ends = np.where(partial, values, plain), np.where(partial[:, None], ends, plain_ends)
-    samples = int(analysis[f"{output}_samples"].values[0])
-    held = np.where(partial, analysis["inputs_held"].values, 0)
-    chance = indices.largest_by_chance(samples, held, len(values))
-    return values, beyond(values, ends, chance)
+def _samples(analysis: xr.Dataset, output: str) -> int:
+    return int(analysis[f"{output}_samples"].values[0])
 
 
 def _correlations(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ...]:
     """The cells of an input's rank correlations."""
     if output not in _correlated(analysis) or name not in analysis["input"].values:
-        return ("-",) * len(_RANKS)
+        return ("-",) * len(RANKS)
     one = analysis.sel(input=name)
-    known = (f"{output}_{word}rank_correlation" for word in _RANKS)
+    known = (f"{output}_{word}rank_correlation" for word in RANKS)
     cells = [_signed(one[each].item(), one[f"{each}_interval"].values) for each in known]
     # The one that holds the other inputs says more, and one is enough.
     return (cells[0], "-") if cells[0] != "-" else tuple(cells)

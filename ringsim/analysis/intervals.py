@@ -431,12 +431,8 @@ def varies(campaign: xr.Dataset, name: str) -> bool:
 
 
 def same_within(campaign: xr.Dataset, name: str) -> float:
-    """The median numerical error of an output if it explains all differences between samples, 0 if
-    rounding does; NaN if they are larger.
-
-    One value suits all samples: their standard deviation is below the median error bar, as Birge,
-    Phys. Rev. 40 (1932) 207 compares scatter with errors, and none is farther from the mean than
-    the largest of so many normal errors (Bonferroni's bound).
+    """The median error bar of an output if no sample is farther from the mean than that, so that
+    one value suits all; 0 if they differ by rounding alone, NaN if by more.
     """
     own, bars = (numbers(campaign, each)[good(campaign)] for each in (name, f"{name}_error"))
     own, bars = own[np.isfinite(own)], bars[np.isfinite(bars)]
@@ -444,9 +440,8 @@ def same_within(campaign: xr.Dataset, name: str) -> float:
         return 0.0
     if not len(bars):
         return np.nan
-    bar, most = float(np.median(bars)), scipy.stats.norm.isf((1 - LEVEL) / 2 / len(own))
-    same = spread(own) < bar and np.abs(own - own.mean()).max() < most * bar
-    return bar if same else np.nan
+    bar = float(np.median(bars))
+    return bar if np.abs(own - own.mean()).max() <= bar else np.nan
 
 
 def tells_of(campaign: xr.Dataset, name: str) -> Mask:

@@ -129,7 +129,7 @@ def _verdicts(analysis: xr.Dataset) -> Table:
             _decisive(Verdict(one["reweighted_verdict"].item()), *one["reweighted_bounds"].values),
         ))  # fmt: skip
     head = ("requirement, reweighted", "probability", "confidence", "verdict", "estimate",
-            _SURELY)  # fmt: skip
+            _BOUND)  # fmt: skip
     return marked(Table(head, rows), analysis, head.index("estimate"))
 
 
@@ -274,6 +274,14 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             bad, used = one["samples_violating"], one["samples_used"]
             so_far = f"{bad} of {used} violate it so far; " * bool(bad)
             notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
+        if bad := one["samples_violating"]:
+            share, low, high = (
+                number_text(1.0 - one[f"probability{end}"]) for end in ("", "_upper", "_lower")
+            )
+            notes.append(
+                f"{name}: violated with a probability of {share} ({low} .. {high}, each bound with "
+                "the confidence required)"
+            )
         if verdict != alone:
             notes.append(
                 f"{name}: without the failed runs it would be {alone.words}; run them again "
@@ -294,17 +302,16 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             )
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
-        "verdict", "estimate", _SURELY, "used", "violating", "failed runs",
+        "verdict", "estimate", _BOUND, "used", "violating", "failed runs",
         "verdict without failed runs", "further",
     )  # fmt: skip
     return marked(Table(head, rows, notes), analysis, head.index("estimate"))
 
 
-_SURELY = "surely"
+_BOUND = "one-sided bound"
 _DECIDES = (
-    "surely: the one-sided bound at that confidence that decides: met if it is at least the "
-    "probability, not met if it is at most less than that; where neither decides, both are told. "
-    "Two-sided intervals of 95 % decide nothing"
+    "the one-sided bound, at the confidence required, decides each verdict; where neither the "
+    "lower nor the upper bound decides, both are given"
 )
 
 
@@ -354,10 +361,8 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         count = str(used) if used == run else f"{used} of {run}"
         within = factor * float(analysis[f"{name}_same_within"])
         if all_alike(least, most) or np.isfinite(within):
-            middle = (least + most) / 2
-            value = "0" if abs(middle) < NOTHING else f"{number_text(middle)} {units}".rstrip()
-            error = f"{within:.2g} {units}".rstrip()
-            error = f" (differs by less than its error bars, {error})"
+            value = "0" if abs(mean) < NOTHING else f"{number_text(mean)} {units}".rstrip()
+            error = f" (within its error bar of {within:.2g} {units}".rstrip() + ")"
             alike.append(
                 f"{name} {value}{error * (within > 0)}" + f" (in {count})" * int(used < run)
             )

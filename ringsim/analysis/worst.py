@@ -21,8 +21,8 @@ from ringsim.analysis.design import (
     short_of_goal,
 )
 from ringsim.analysis.indices import UNLIKELY, dependence
-from ringsim.analysis.influence import separating
-from ringsim.analysis.intervals import Mask, lost, numbers, quantities, ran
+from ringsim.analysis.influence import separating, standing_out
+from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
 from ringsim.stepping.instant import Array
@@ -47,17 +47,20 @@ _ROUND_OFF = 1e-9
 _ZERO = 273.15
 """0 C in K."""
 NOTE_ON_UNUSUAL = (
-    "unusual inputs: first those that separate the failures from the other samples, then those "
-    "outside the central 90 % of all samples; in brackets the difference from the median, for "
-    "temperatures the value in C"
+    "unusual inputs: first those that separate the failures from the other samples, or that go "
+    "with the output, then those outside the central 90 % of all samples; in brackets the "
+    "difference from the median, for temperatures the value in C"
 )
 
 
 class _Oddity(NamedTuple):
-    """An input of a sample, and the share of samples that have it as far out."""
+    """An input of a sample, and the share of samples that have it as far out; words, as of a fault
+    that was drawn, come ``before`` numbers.
+    """
 
     share: float
     words: str
+    before: bool = False
 
 
 def unusual(
@@ -96,7 +99,7 @@ def unusual(
             each for variable in variables.values() if variable.name not in named
             for each in _odd(variable, place)
         ]  # fmt: skip
-        told += [each.words for each in sorted(odd, key=lambda each: each.share)]
+        told += [each.words for each in sorted(odd, key=lambda each: (not each.before, each.share))]
         found.append("; ".join(told[:_MOST]) or "nothing unusual")
     return found
 
@@ -123,7 +126,7 @@ def _odd(variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
     if _has_words(variable):
         share, words = _word(variable, sample)
         if share <= 2.0 * RARE:  # words have no side
-            yield _Oddity(share, words)
+            yield _Oddity(share, words, before=True)
         return
     numbers, odd = variable.to_numpy().astype(float), list[_Oddity]()
     for each, of in (
@@ -156,7 +159,7 @@ def _told(name: str, rows: Array, value: float, units: str) -> str:
     end = {rows.min(): ", the lowest", rows.max(): ", the highest"}.get(value, "")
     if units == "K":
         word = "cold" if value < middle else "hot"
-        return f"{word}: {name} {value:.4g} K ({value - _ZERO:+.0f} C{end})"
+        return f"{name} {value:.4g} K ({value - _ZERO:+.0f} C, {word}{end})"
     if rows.min() > 0.0 or rows.max() < 0.0:
         ratio = value / middle
         far = f"{100.0 * (ratio - 1.0):+.0f} %" if ratio < 3.0 else f"{ratio:.2g} times"
@@ -182,6 +185,8 @@ class _Failure(NamedTuple):
     """By which samples are ordered, the worst the largest; NaN comes last."""
     value: str
     """Output that is told of each sample; empty for the reason of its end."""
+    larger: bool | None = None
+    """Whether values of it are worse that are larger; None where both may be."""
 
 
 def worst(
@@ -211,7 +216,7 @@ def worst(
             told = _found(campaign, each.value, place)
             rows.append((each.words, int(each.own.sum()), campaign.sizes["sample"], told))
             chosen.append(place)
-            sides.append(_of_failure(every, each.words))
+            sides.append(_of_failure(every, each.words) or _of_output(analysis, each, campaign))
     if not rows:
         return xr.Dataset()
     failures, failed, of, found = zip(*rows, strict=True)
@@ -248,6 +253,23 @@ def _of_failure(sides: Mapping[str, dict[str, bool]], words: str) -> dict[str, b
     return next((sides[name] for name in names if name in sides), {})
 
 
+def _of_output(
+    analysis: xr.Dataset | None, failure: _Failure, campaign: xr.Dataset
+) -> dict[str, bool]:  # fmt: skip
+    """The inputs that go with the output which fails beyond chance, the strongest first, and
+    whether larger ones make it worse: where nearly all samples fail nothing separates these.
+    """
+    if analysis is None or failure.larger is None:
+        return {}
+    if f"{failure.value}_rank_correlation" not in analysis:
+        return {}
+    samples = int(np.isfinite(numbers(campaign, failure.value)[good(campaign)]).sum())
+    values, listed = standing_out(analysis, failure.value, samples)
+    order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
+    names = analysis["input"].values.astype(str)
+    return {str(names[k]): (values[k] > 0.0) == failure.larger for k in order if listed[k]}
+
+
 def _failures(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement]
 ) -> list[_Failure]:  # fmt: skip
@@ -261,7 +283,8 @@ def _failures(
         words, own = f"violates {wanted.told(name)}", violations(campaign, name, wanted)
         if not np.isfinite(badness[own]).any():  # why they ended tells more
             badness, value = stuck, ""
-        found.append(_Failure(words, own, badness, value))
+        known = value and None in (wanted.max, wanted.min)
+        found.append(_Failure(words, own, badness, value, wanted.min is None if known else None))
     ends, came = endings(campaign), -numbers(campaign, "final_time")
     found += [_Failure(word, ends == word, stuck, "") for word in short_of_goal(ends)]
     kinds = [word for word in kinds_of_ends(ends) if word.startswith(LOST)]

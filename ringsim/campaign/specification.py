@@ -73,8 +73,8 @@ class Specification(Model):
     limits: Allowance = Allowance()
     """What one run may use before it is ended."""
     fidelity: Annotated[Literal["full", "frame"], BeforeValidator(_not_gone)] = "full"
-    """full: the flexible multibody model; frame: the same in joint coordinates, several times as
-    fast."""
+    """full: the flexible multibody model; frame: the same in joint coordinates, some thirty times
+    as fast."""
     check_every: Annotated[int, Field(ge=0)] = 0
     """One sample in so many runs with the full model, too, as a check of the frame engine: samples
     0, check_every, 2 check_every, ...; 0 for none."""

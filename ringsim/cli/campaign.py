@@ -191,7 +191,8 @@ def replay_command(
     if result.log:
         click.echo(result.log)
     name = f"{'check of ' * check}sample {sample}"
-    click.echo(f"{name}: {result.status.word}: {result.reason} ({result.seconds:.2f} s)")
+    how = result.fate.words if result.fate else result.status.word
+    click.echo(f"{name}: {how}: {result.reason} ({result.seconds:.2f} s)")
     if save is not None:
         from ringsim.dataset import to_dataset
 

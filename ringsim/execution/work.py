@@ -5,7 +5,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from pydantic import Field
 
 from ringsim.outputs import VARIABLES
 from ringsim.overrides import section_of
+from ringsim.parts.solver import Limits
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Table
 from ringsim.scene import Scene
@@ -42,6 +43,11 @@ _T = TypeVar("_T")
 
 class Allowance(Model):
     """What one run may use before it is ended: the table [limits] of a campaign."""
+
+    gone: ClassVar[dict[str, str]] = {
+        name: f'that is a limit of the scene: [set] "limits.{name}" = VALUE'
+        for name in Limits.model_fields
+    }
 
     timeout: Second = 3600.0
     """Elapsed time of one run."""

@@ -98,7 +98,7 @@ def instead_of(name: str, *senses: str) -> str:
             told.append(f"its {sense}, {found[0]}")
         else:
             lacking.append(sense)
-    words = f"{name} has a value for each {' and '.join(VARIABLES[name].dims)}: give "
+    words = f"{name} has a value for each {' and '.join(VARIABLES[name].dims)}: use "
     if told:
         return words + " or ".join(told)
     near = [n for n in (f"{name}_joints", f"total_{name}") if n in VARIABLES]

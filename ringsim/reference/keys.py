@@ -127,6 +127,8 @@ class Key:
         if self.choices:
             return " or ".join(map(json.dumps, self.choices))
         annotation = self.field.annotation
+        if self.attribute == "pulley":  # names become numbers before a fault is made
+            return "name, or whole number"
         what = " or ".join(dict.fromkeys(_plain(annotation))) or "any value"
         if self.holder == "names" and typing.get_origin(annotation) is dict:
             return f"{what} by name"

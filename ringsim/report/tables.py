@@ -35,7 +35,8 @@ Rows = list[list[str]]
 
 
 def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
-    """Samples, ending, cause, reason, command that repeats the first; how many rows are left out.
+    """Samples, ending with its cause, reason, command that repeats the first; how many rows are
+    left out.
 
     Runs that lost their numbers, and sound ones in which the antenna fell short of its goal; a row
     for all that ended in the same way.  Antennas end in the same way that differ by places and
@@ -57,10 +58,11 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
     rows = []
     for shape, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith(LOST)):
         mark = "" if len(said[shape]) == 1 else f"sample {samples[0]}: "
-        how = *shape[:2], mark + first[shape]
+        ending, cause, _ = shape
+        told = ending + f" ({cause})" * bool(cause), mark + first[shape]
         named = ", ".join(map(str, samples[:_MOST_NAMED]))
         named += f" and {len(samples) - _MOST_NAMED} more" * (len(samples) > _MOST_NAMED)
-        rows.append([named, *how, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])
+        rows.append([named, *told, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])
     return rows[:MOST_FAILURES], max(0, len(rows) - MOST_FAILURES)
 
 

@@ -105,22 +105,22 @@ def test_what_differs_by_less_than_its_numerical_error_is_one_value():
     """Peaks are 40 N with errors of 0.1 N that go with x1, so that indices would name it."""
     made = drawn_campaign(RandomDesign(samples=400), linear, 3, 4)
     error = 0.1 * (2 * made["x1"].values - 1)
-    bars = np.where(np.arange(400) % 10 == 0, 0.1, np.nan)  # of one sample in ten
+    bars = np.where(np.arange(400) % 10 == 0, 0.11, np.nan)  # of one sample in ten
     made["peak_tension"] = "sample", 40.0 + error, {"units": "N"}
     made["peak_tension_error"] = "sample", bars, {"units": "N"}
     one = analyse(made)
     table, told_of = statistics_table(one), "\n".join(told(one))
     assert [row[0] for row in table.rows] == ["asynchrony_max"]
     assert table.notes == [
-        "the same in all samples: peak_tension 40 N (differs by less than its error bars, 0.1 N)"
+        "the same in all samples: peak_tension 40 N (within its error bar of 0.11 N)"
     ]
     assert told_of.count("peak_tension") == 1
     assert "peak_tension" not in one.output.values
     assert "peak_tension_rank_correlation" not in one
-    # Half of that error is less than what is seen, and so is one peak that no error explains.
+    # Half of that error is less than what is seen, and a single sample may be enough.
     made["peak_tension_error"] = "sample", bars / 2, {"units": "N"}
     assert "peak_tension" in [row[0] for row in statistics_table(analyse(made)).rows]
-    made["peak_tension"][7] = 40.6
+    made["peak_tension"][7] = 40.2
     made["peak_tension_error"] = "sample", bars, {"units": "N"}
     assert np.ptp(made["peak_tension"].values[:7]) < 0.2
     assert np.isnan(analyse(made).peak_tension_same_within)

@@ -85,7 +85,7 @@ def test_margin_and_outcome_are_judged(campaign: xr.Dataset) -> None:
 
 def test_a_requirement_on_the_course_of_the_margin_names_its_smallest() -> None:
     wanted = {"drive_margin": {"min": 0.0, "probability": 0.9, "confidence": 0.9}}
-    with pytest.raises(InputError, match="give its least, least_drive_margin"):
+    with pytest.raises(InputError, match="use its least, least_drive_margin"):
         read_requirements(wanted, "requirements")
 
 

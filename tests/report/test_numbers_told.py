@@ -222,7 +222,7 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
         ends = bound(run - worse, run, level)[0], bound(run - bad, run, level)[1]
         told = [f"at least {ends[0]:.4g}", f"at most {ends[1]:.4g}"]
         decisive = {"met": told[0], "not met": told[1], "not yet shown": ", ".join(told)}
-        assert row["surely"] == decisive[word(ends)]
+        assert row["one-sided bound"] == decisive[word(ends)]
         assert row["verdict"] == word(ends)
         if lost:
             alone = word(bound(used - bad, used, level))
@@ -424,7 +424,7 @@ def test_the_report_says_what_the_file_holds(told: tuple[File, list[str], str, l
     texts = [" ".join(each.split()) for each in page.texts]
     count = int(file.ok.sum())
     counted = f"{count} of {COUNT} samples are in the statistics"
-    counted = "All samples have run to an end" if count == COUNT else counted
+    counted = "All samples have valid results" if count == COUNT else counted
     assert any(counted in each for each in texts)
     known = {"model-table", "inputs-table", "failures-table"}
     for name in page.found:

@@ -177,7 +177,7 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
 def test_samples_that_ended_alike_share_a_row_and_words_have_no_unit() -> None:
     campaign = made_campaign(30, failed=(2,), stalled=tuple(range(5, 30)))
     rows, more = tables.failures(campaign, "made")
-    assert [row[1] for row in rows] == ["failed: timeout", "stalled"]
+    assert [row[1] for row in rows] == ["failed: timeout (time limit)", "stalled"]
     assert rows[1][0] == ", ".join(map(str, range(5, 25))) + " and 5 more"
     assert (rows[1][-1], more) == ("ringsim replay made 5", 0)
     assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "s"

@@ -156,6 +156,7 @@ def test_an_output_that_takes_nothing_costs_no_result(
 
 INTERRUPTED = """
 import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 from ringsim.__main__ import main
 from ringsim.exudyn.cables import CableDrive
 evaluate, calls = CableDrive.evaluate, []
