@@ -23,7 +23,7 @@ from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 from matplotlib.text import Text
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from matplotlib.transforms import Bbox
 from PIL import Image
 
@@ -156,6 +156,11 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     words = words[:1].upper() + words[1:]
     held = unit_behind(words, units.replace(" ", _FIXED))
     return textwrap.fill(held, width).replace(_FIXED, " ")
+
+
+def unit_label(variable: xr.DataArray) -> str:
+    """The unit of a variable as an axis says it that is named elsewhere: "(s)", or nothing."""
+    return unit_behind("", str(variable.attrs.get("units", "1"))).strip()
 
 
 def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
@@ -407,6 +412,26 @@ def margin_axis(axes: Axes, margins: np.ndarray) -> None:
     below = (-0.5 * k for k in range(1, int(max(0.0, -2.0 * least)) + 1))
     axes.set_yticks(sorted({0.0, 0.5, 1.0, 2.0, 5.0, *powers, *below}))
     plain_numbers(axes.yaxis)
+
+
+_LETTER, _APART = 6.2, 6.0
+"""Width of a letter of a tick's label, and the least between two labels, in points."""
+
+
+def few_ticks(axes: Axes, most: int = 5) -> None:
+    """Ticks along x, fewer where their labels are long: these do not run into each other."""
+    axis, columns = axes.xaxis, axes.get_subplotspec()
+    share = 0.75 / (columns.get_gridspec().ncols if columns is not None else 1)
+    points = 72.0 * share * axes.get_figure(root=True).get_size_inches()[0]
+    low, high = sorted(axis.get_view_interval())
+    for count in range(most, 1, -1):
+        axis.set_major_locator(MaxNLocator(count))
+        places = axis.get_majorticklocs()
+        words = axis.get_major_formatter().format_ticks(places)
+        longest = max(map(len, words), default=0)
+        step = np.diff(places).min(initial=high - low)
+        if points * step >= (high - low) * (_LETTER * longest + _APART):
+            break
 
 
 def plain_numbers(axis: Axis) -> None:
