@@ -219,7 +219,10 @@ def test_the_verb_writes_the_page_and_refuses_what_it_cannot_write(
     assert f"wrote {out} (" in done.output
     assert "stop.stiffness" in out.read_text(encoding="utf-8")
     for more, told in (
-        (["--report", str(tmp_path / "page.txt")], "the page is HTML: give a name such as page.html"),
+        (
+            ["--report", str(tmp_path / "page.txt")],
+            "the page is HTML: give a name such as page.html",
+        ),
         (["--pdf"], "--pdf: has no effect without --report"),
         (["--report", str(tmp_path / "none" / "page.html")], "none"),
     ):
