@@ -244,16 +244,35 @@ def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: flo
 
     Called when all is drawn: words inside the axes then move away from the curves.
     """
-    inches = figure.get_size_inches()[0]
+    above, end = heading(dataset, subject, figure.get_size_inches()[0])
+    title(figure, above)
+    # The second of two lines reaches to what stands above the axes at their right end.
+    axes.set_title(end, pad=pad + _RAISED * end.count("\n"))
+    settle(figure)
+
+
+_RAISED = 12.0
+"""How much higher than one line two stand above axes, in points."""
+_HEAD_LINES = 0.19, 0.17 + _RAISED / 72.0
+"""Height on the sheet of each further line of a subject, and of an ending, in inch."""
+
+
+def heading(dataset: xr.Dataset, subject: str, inches: float) -> tuple[str, str]:
+    """Subject and scene, and how the run ended, each in lines that fit a sheet so wide."""
     words, width = f"{subject}: {scene_title(dataset)}".rstrip(": "), int(10.3 * inches)
     lines = len(textwrap.wrap(words, width))
     # The narrowest text with as few lines: all are about equally long.
     fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
-    title(figure, textwrap.fill(words, next(fitting, width)))
     end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
-    # The second of two lines reaches to what stands above the axes at their right end.
-    axes.set_title("\n".join(end), pad=pad + 12.0 * (len(end) > 1))
-    settle(figure)
+    return textwrap.fill(words, next(fitting, width)), "\n".join(end)
+
+
+def further_lines(dataset: xr.Dataset, subject: str, inches: float) -> float:
+    """Height in inch that the lines of a heading need beyond one of the subject and one of how
+    the run ended.
+    """
+    texts = heading(dataset, subject, inches)
+    return sum(each * text.count("\n") for each, text in zip(_HEAD_LINES, texts, strict=True))
 
 
 def scene_title(dataset: xr.Dataset) -> str:
