@@ -39,6 +39,8 @@ FREE = "free-label"
 _ACROSS = {"left": 0.02, "right": 0.98, "center": 0.5}
 _HEIGHTS = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2)
 """Upper edges that are tried, in shares of the axes, for lines that leave room in one corner."""
+_AIR = 4.0
+"""Around words, in pixels of the sheet: their background is larger than they are."""
 
 
 def free(text: Text) -> None:
@@ -52,7 +54,9 @@ def settle(figure: Figure) -> None:
     if any(texts for _, texts in movable):
         figure.draw_without_rendering()  # settles the layout, on which positions depend
     for axes, texts in movable:
-        curves, taken = list(_curves(axes)), list[Bbox]()
+        curves = list(_curves(axes))
+        fixed = (t for t in axes.texts if t.get_gid() != FREE and t.get_visible() and t.get_text())
+        taken = [text.get_window_extent().padded(_AIR) for text in fixed]
         for text in texts:
             own = (text.get_position(), text.get_horizontalalignment())
             places = [own, *(((_ACROSS[ha], y), ha) for y, ha in product(_HEIGHTS, _ACROSS))]
@@ -69,12 +73,15 @@ def _cost(
     axes: Axes, text: Text, place: tuple[tuple[float, float], str], curves: list[Outline],
     taken: list[Bbox],
 ) -> int:  # fmt: skip
-    """How many curves words would cover there; other words and the frame count more."""
+    """How many curves words would cover there; other words and the frame count more.
+
+    Words that cannot be moved are among those in the way.
+    """
     _move(text, place)
     box, frame = text.get_window_extent(), axes.get_window_extent()
     words = sum(box.overlaps(other) for other in taken)
     outside = box.y0 < frame.y0 or box.x0 < frame.x0 or box.x1 > frame.x1
-    covered = sum(bool(one.intersects_bbox(box.padded(2.0), filled=False)) for one in curves)
+    covered = sum(bool(one.intersects_bbox(box.padded(_AIR), filled=False)) for one in curves)
     return covered + (len(curves) + 1) * int(words + outside)
 
 
