@@ -424,8 +424,8 @@ _MOST_MARGIN = 1e3
 """Beyond it next to nothing resists, and how little says nothing."""
 
 
-def margin_axis(axes: Axes, margins: np.ndarray) -> None:
-    """Value axis of margins, linear up to 1 and logarithmic from there on.
+def margin_axis(axes: Axes, margins: np.ndarray, words: str) -> None:
+    """Value axis of margins with its name, linear up to 1 and logarithmic from there on.
 
     Where little resists, margins are a hundred times what they are where it counts.
     """
@@ -438,6 +438,7 @@ def margin_axis(axes: Axes, margins: np.ndarray) -> None:
     below = (-0.5 * k for k in range(1, int(max(0.0, -2.0 * least)) + 1))
     axes.set_yticks(sorted({0.0, 0.5, 1.0, 2.0, 5.0, *powers, *below}))
     plain_numbers(axes.yaxis)
+    axes.set_ylabel(f"{words}\n(linear to 1,\nlogarithmic above)", fontsize=9.5)
 
 
 _LETTER, _APART = 6.2, 6.0
