@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import PercentFormatter
 
 from ringsim.analysis.comparison import paired
 from ringsim.analysis.comparison_text import differing, names_of
@@ -21,7 +21,7 @@ from ringsim.tables import estimate_text, interval_text, readable, unit_text, wi
 _LOOKS = ((style.BLUE, "-"), (style.ORANGE, (0, (5, 1.5))))
 """Colour and dashes of either: dashes tell them apart in grey."""
 _BANDS = (0.05, 0.5, 0.95)
-_WIDE = 44
+_WIDE = 40
 """Letters of a title above a panel."""
 _RECORDS = 301
 """Times of a course at most: more than a figure resolves, and all samples are read at each."""
@@ -102,11 +102,12 @@ def pairs(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
         axes.set_title(textwrap.fill(
             f"mean {estimate_text(mean, low, high, 3)} {unit_text(units)}".rstrip()
             + (f" ({interval_text(low, high, 3)})" if np.isfinite(low + high) else "")
-            + f", n = {int(known.sum())}", _WIDE), fontsize=9,
+            + f", n\u00a0=\u00a0{int(known.sum())}", _WIDE).replace("\u00a0", " "), fontsize=9,
         )  # fmt: skip
         axes.set_xlabel(f"{style.label(both[0][name], width=38)}, {first}", fontsize=9)
-        axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.set_ylabel(style.unit_label(both[0][name]), fontsize=9)
         axes.ticklabel_format(useOffset=False)
+        style.few_ticks(axes)
     figure.supylabel(f"Difference: {second} less {first}", fontsize=10.5)
     legend(figure, panels)
     style.title(figure, f"Differences of {found.attrs['pairs']} pairs: {second} less {first}")
@@ -136,8 +137,8 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
         axes.set_title(f"n = {', '.join(counts)}", fontsize=9, pad=16.0 if wanted else None)
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.xaxis.set_major_locator(MaxNLocator(5))
         style.plain_numbers(axes.xaxis)
+        style.few_ticks(axes)
         axes.set_xlabel(style.label(both[0][name], width=38), fontsize=9)
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")

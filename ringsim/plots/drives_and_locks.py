@@ -61,8 +61,7 @@ def drive(dataset: xr.Dataset) -> Figure:
         0.98, 0.95, f"least margin {least:.2f} at {where:.0f} deg", ha="right", va="top",
         transform=lower.transAxes,
     ))  # fmt: skip
-    style.margin_axis(lower, margin)
-    lower.set_ylabel("Margin by the standard")
+    style.margin_axis(lower, margin, "Margin by the standard")
     lower.set_xlabel("Mean opening angle (deg)")
     style.head(figure, upper, dataset, "Drive and resistance")
     return figure

@@ -64,7 +64,9 @@ def ring(dataset: xr.Dataset, states: int = 3) -> Figure:
     sizes = np.array([lines.max(axis=(0, 1)) for _, lines, _ in shots]) - low
     height = float(sizes[:, 1].max())
     scale, cells = _fit(sizes[:, 0], height)
+    subject = "Deployment as computed" if shape.computed else "Deployment"
     wide, high = _WIDTH + 2 * _SIDE, _BELOW + height * scale + _ABOVE
+    high += style.further_lines(dataset, subject, wide)
     figure = Figure(figsize=(wide, high))
     figure.set_layout_engine("none")
     # Axes in metre whose frame is the drawing, between room for words above and below.
@@ -83,7 +85,6 @@ def ring(dataset: xr.Dataset, states: int = 3) -> Figure:
     looks = [look | {"linestyle": "none"} if "marker" in look else look for look in looks]
     entries = [Line2D([], [], **look) for look in looks]
     figure.legend(handles=entries, loc="lower center", ncols=len(entries))
-    subject = "Deployment as computed" if shape.computed else "Deployment"
     style.head(figure, axes, dataset, subject, pad=72.0 * _BAR)
     return figure
 

@@ -23,7 +23,7 @@ from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 from matplotlib.text import Text
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from matplotlib.transforms import Bbox
 from PIL import Image
 
@@ -39,6 +39,8 @@ FREE = "free-label"
 _ACROSS = {"left": 0.02, "right": 0.98, "center": 0.5}
 _HEIGHTS = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2)
 """Upper edges that are tried, in shares of the axes, for lines that leave room in one corner."""
+_AIR = 4.0
+"""Around words, in pixels of the sheet: their background is larger than they are."""
 
 
 def free(text: Text) -> None:
@@ -52,7 +54,9 @@ def settle(figure: Figure) -> None:
     if any(texts for _, texts in movable):
         figure.draw_without_rendering()  # settles the layout, on which positions depend
     for axes, texts in movable:
-        curves, taken = list(_curves(axes)), list[Bbox]()
+        curves = list(_curves(axes))
+        fixed = (t for t in axes.texts if t.get_gid() != FREE and t.get_visible() and t.get_text())
+        taken = [text.get_window_extent().padded(_AIR) for text in fixed]
         for text in texts:
             own = (text.get_position(), text.get_horizontalalignment())
             places = [own, *(((_ACROSS[ha], y), ha) for y, ha in product(_HEIGHTS, _ACROSS))]
@@ -69,12 +73,15 @@ def _cost(
     axes: Axes, text: Text, place: tuple[tuple[float, float], str], curves: list[Outline],
     taken: list[Bbox],
 ) -> int:  # fmt: skip
-    """How many curves words would cover there; other words and the frame count more."""
+    """How many curves words would cover there; other words and the frame count more.
+
+    Words that cannot be moved are among those in the way.
+    """
     _move(text, place)
     box, frame = text.get_window_extent(), axes.get_window_extent()
     words = sum(box.overlaps(other) for other in taken)
     outside = box.y0 < frame.y0 or box.x0 < frame.x0 or box.x1 > frame.x1
-    covered = sum(bool(one.intersects_bbox(box.padded(2.0), filled=False)) for one in curves)
+    covered = sum(bool(one.intersects_bbox(box.padded(_AIR), filled=False)) for one in curves)
     return covered + (len(curves) + 1) * int(words + outside)
 
 
@@ -158,6 +165,11 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     return textwrap.fill(held, width).replace(_FIXED, " ")
 
 
+def unit_label(variable: xr.DataArray) -> str:
+    """The unit of a variable as an axis says it that is named elsewhere: "(s)", or nothing."""
+    return unit_behind("", str(variable.attrs.get("units", "1"))).strip()
+
+
 def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
     """Factor and prefixed unit that scale the largest value to between 0.5 and 500.
 
@@ -239,16 +251,35 @@ def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: flo
 
     Called when all is drawn: words inside the axes then move away from the curves.
     """
-    inches = figure.get_size_inches()[0]
+    above, end = heading(dataset, subject, figure.get_size_inches()[0])
+    title(figure, above)
+    # The second of two lines reaches to what stands above the axes at their right end.
+    axes.set_title(end, pad=pad + _RAISED * end.count("\n"))
+    settle(figure)
+
+
+_RAISED = 12.0
+"""How much higher than one line two stand above axes, in points."""
+_HEAD_LINES = 0.19, 0.17 + _RAISED / 72.0
+"""Height on the sheet of each further line of a subject, and of an ending, in inch."""
+
+
+def heading(dataset: xr.Dataset, subject: str, inches: float) -> tuple[str, str]:
+    """Subject and scene, and how the run ended, each in lines that fit a sheet so wide."""
     words, width = f"{subject}: {scene_title(dataset)}".rstrip(": "), int(10.3 * inches)
     lines = len(textwrap.wrap(words, width))
     # The narrowest text with as few lines: all are about equally long.
     fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
-    title(figure, textwrap.fill(words, next(fitting, width)))
     end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
-    # The second of two lines reaches to what stands above the axes at their right end.
-    axes.set_title("\n".join(end), pad=pad + 12.0 * (len(end) > 1))
-    settle(figure)
+    return textwrap.fill(words, next(fitting, width)), "\n".join(end)
+
+
+def further_lines(dataset: xr.Dataset, subject: str, inches: float) -> float:
+    """Height in inch that the lines of a heading need beyond one of the subject and one of how
+    the run ended.
+    """
+    texts = heading(dataset, subject, inches)
+    return sum(each * text.count("\n") for each, text in zip(_HEAD_LINES, texts, strict=True))
 
 
 def scene_title(dataset: xr.Dataset) -> str:
@@ -393,8 +424,8 @@ _MOST_MARGIN = 1e3
 """Beyond it next to nothing resists, and how little says nothing."""
 
 
-def margin_axis(axes: Axes, margins: np.ndarray) -> None:
-    """Value axis of margins, linear up to 1 and logarithmic from there on.
+def margin_axis(axes: Axes, margins: np.ndarray, words: str) -> None:
+    """Value axis of margins with its name, linear up to 1 and logarithmic from there on.
 
     Where little resists, margins are a hundred times what they are where it counts.
     """
@@ -407,6 +438,27 @@ def margin_axis(axes: Axes, margins: np.ndarray) -> None:
     below = (-0.5 * k for k in range(1, int(max(0.0, -2.0 * least)) + 1))
     axes.set_yticks(sorted({0.0, 0.5, 1.0, 2.0, 5.0, *powers, *below}))
     plain_numbers(axes.yaxis)
+    axes.set_ylabel(f"{words}\n(linear to 1,\nlogarithmic above)", fontsize=9.5)
+
+
+_LETTER, _APART = 6.2, 6.0
+"""Width of a letter of a tick's label, and the least between two labels, in points."""
+
+
+def few_ticks(axes: Axes, most: int = 5) -> None:
+    """Ticks along x, fewer where their labels are long: these do not run into each other."""
+    axis, columns = axes.xaxis, axes.get_subplotspec()
+    share = 0.75 / (columns.get_gridspec().ncols if columns is not None else 1)
+    points = 72.0 * share * axes.get_figure(root=True).get_size_inches()[0]
+    low, high = sorted(axis.get_view_interval())
+    for count in range(most, 1, -1):
+        axis.set_major_locator(MaxNLocator(count))
+        places = axis.get_majorticklocs()
+        words = axis.get_major_formatter().format_ticks(places)
+        longest = max(map(len, words), default=0)
+        step = np.diff(places).min(initial=high - low)
+        if points * step >= (high - low) * (_LETTER * longest + _APART):
+            break
 
 
 def plain_numbers(axis: Axis) -> None:

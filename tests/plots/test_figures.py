@@ -234,6 +234,20 @@ def test_limits_of_loads_are_drawn_and_within_the_axes(deployed, scene_of):
     assert not any("limits." in text.get_text() for text in rod_stress(deployed).findobj(Text))
 
 
+def test_names_of_panels_leave_the_words_of_limits_free(deployed, scene_of):
+    """Wherever the limit is: near the top of the axes the corner is taken."""
+    for limit in (2e6, 9e6, 1e8):
+        held = scene_of(18).with_values({"limits.rod_stress": limit, "record.stress": True})
+        figure = rod_stress(deployed.assign_attrs(scene=held.to_toml()))
+        figure.draw_without_rendering()
+        for axes in figure.axes:
+            (told,) = (text for text in axes.texts if text.get_text().startswith("limits."))
+            for text in axes.texts:
+                if text.get_gid() == style.FREE:
+                    box = text.get_bbox_patch().get_window_extent()
+                    assert not box.overlaps(told.get_window_extent())
+
+
 def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
     figure = Figure()
     axes = figure.subplots()

@@ -133,6 +133,19 @@ def test_views_stand_side_by_side_inside_the_sheet(sections, closed, scene_of, m
     assert max(v[:, 1].max() for v in views) <= axes.get_ylim()[1] + 1e-9
 
 
+@pytest.mark.parametrize("words", [3, 60])
+@pytest.mark.parametrize("title", ["A ring", "A ring " + 20 * "of many words "])
+def test_words_above_the_ring_stand_apart(title, words, failed):
+    figure = ring(failed.assign_attrs(title=title, reason=" ".join(["came to rest"] * words)))
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    (head,) = (text for text in figure.texts if text.get_weight() == "bold")
+    (told,) = axes.findobj(lambda each: getattr(each, "get_text", str)().startswith("Solver"))
+    end, subject = told.get_window_extent(), head.get_window_extent()
+    bar = next(text for text in axes.texts if text.get_text().endswith(" m")).get_window_extent()
+    assert bar.y1 < end.y0 < end.y1 < subject.y0 < subject.y1 <= figure.bbox.y1
+
+
 def test_a_ring_that_folds_is_not_called_stowed(scene_of, made_run):
     run = made_run(scene_of(6), until=12.0)
     backwards = run.isel(time=slice(0, 100)).copy(deep=True)

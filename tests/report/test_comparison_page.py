@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 
@@ -169,6 +170,30 @@ def test_titles_of_figures_fit_their_sheets(both: tuple[xr.Dataset, xr.Dataset])
         (title,) = (text for text in figure.texts if text.get_weight() == "bold")
         for text in (title, *(axes.title for axes in figure.axes)):
             assert text.get_window_extent().x1 < figure.bbox.x1
+
+
+def test_differences_have_their_unit_and_labels_stand_apart(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    one, other = (each.copy(deep=True) for each in both)
+    narrow = np.linspace(7.9981, 7.99825, one.sizes["sample"])
+    for each, factor in ((one, 1.0), (other, 1.1)):
+        each["peak_rod_stress"] = "sample", factor * 1e6 * narrow, {"units": "Pa"}
+        each["peak_net_tension"] = "sample", narrow * factor, {"units": "N"}
+    found = compare(one, other, ("a", "b"))
+    drawn = {name: figure for name, _, figure in figures_of_both(found, one, other)}
+    figure = drawn["differences"]
+    figure.draw_without_rendering()
+    panels = {axes.get_xlabel(): axes for axes in figure.axes if axes.get_visible()}
+    stress, net = panels["Peak_rod_stress (MPa), a"], panels["Peak_net_tension (N), a"]
+    assert (stress.get_ylabel(), net.get_ylabel()) == ("(MPa)", "(N)")
+    told = [float(tick.get_text().replace("\u2212", "-")) for tick in stress.get_yticklabels()]
+    assert told == pytest.approx(1e-6 * stress.get_yticks(), abs=1e-6)
+    for axes in (*panels.values(), *drawn["values"].axes):
+        low, high = axes.get_xlim()
+        shown = zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+        boxes = [tick.get_window_extent() for place, tick in shown if low <= place <= high]
+        assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
 
 
 def test_two_runs_are_drawn_over_time(both: tuple[xr.Dataset, xr.Dataset]) -> None:

@@ -1,5 +1,7 @@
 """Courses of all samples of a campaign: the fan, lags by section, the order of locks."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -21,6 +23,10 @@ _NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")
 """Asynchrony first: without a value of it there is nothing to draw."""
 _LOOKS = ((style.BLUE, "solid", 1.9), (style.ORANGE, (0, (3, 1.5)), 1.2))
 """Colour, dashes and width of each plane's median: alike ones are both seen, one on the other."""
+_WORST: dict[str, Any] = {
+    "color": style.INK, "linewidth": 1.0, "linestyle": (0, (6, 1.2, 1, 1.2)),
+}  # fmt: skip
+"""The worst sample: dashes like those of no median, also in grey."""
 _WIDEST = 6
 
 
@@ -62,8 +68,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
                   label="median", zorder=4)  # fmt: skip
         if one is not None:
             single = one.sel(plane=plane, section=sections[number])
-            axes.plot(single["time"], single, color=style.INK, linewidth=0.8, linestyle=dashes,
-                      zorder=3)  # fmt: skip
+            axes.plot(single["time"], single, zorder=3, **_WORST)
         if plane == planes[0]:
             axes.set_title(f"section {sections[number]}", fontsize=9, pad=3)
         if plane == planes[-1] and number + columns >= len(sections):
@@ -85,7 +90,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     ]
     lines = [Line2D([], [], color=style.GREY, linewidth=1.8, label="median")]
     if one is not None:
-        lines += [Line2D([], [], color=style.INK, linewidth=0.9, label=f"worst: sample {worst}")]
+        lines += [Line2D([], [], label=f"worst: sample {worst}", **_WORST)]
     figure.legend(handles=[*words, *bands, *lines], loc="outside lower center", ncols=3)
     note = "After its end a deployed ring counts as in step, any other keeps its last deviation."
     head(figure, campaign, "Ahead and behind", f"{told(campaign, len(read.samples))}. {note}")

@@ -127,9 +127,8 @@ def margin(campaign: xr.Dataset) -> Figure:
     grid = angle_grid(rows)
     laid = np.array([laid_on(grid, *row) for row in rows])
     bands_by_ending(lower, grid, laid, words)
-    style.margin_axis(lower, np.append(laid, values.min()))
+    style.margin_axis(lower, np.append(laid, values.min()), "Margin of the drive")
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
-    lower.set_ylabel("Margin of the drive")
     lower.set_xlabel("Mean opening angle (degree)")
     legend(figure, [lower], 4)
     note = f"{counted(campaign, words)} Dashed: the margin of 0 that the standard requires."
