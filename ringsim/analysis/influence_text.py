@@ -280,10 +280,12 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
         cure = "no intervals: set design.replicates = 8 or more (independent replicates)"
         return [cure] * bool(none) + _unsure(analysis)
     if "given_data_index" in analysis:
+        words = any(is_word(str(name), places_in(analysis)) for name in analysis["input"].values)
+        told = "; each word of an input counts by itself, so that these may add up to more than 1"
         return [
             "first-order index: share of the variance that one input alone explains, estimated "
             "from bins of its values and corrected for chance; too small if the output is "
-            "strongly nonlinear within a bin"
+            "strongly nonlinear within a bin" + told * words
         ]
     return []
 
