@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -134,6 +135,26 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     assert labels == ["3.0", "none"]
     assert "below the line" not in words(by_input(made_campaign(3)))
     assert places.tolist() == [0, 1] * 4
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 7])
+def test_words_of_inputs_are_whole_and_stand_apart(count: int) -> None:
+    campaign = made_campaign(8)
+    faults = [f"failed-latch(plane=upper, section={k}, time=0.5)" for k in range(count - 1)]
+    faults = [*faults, "none"]
+    about = {"role": "input", "input": "faults", "units": "1"}
+    held = np.array([faults[k % count] for k in range(8)], dtype=object)
+    campaign["input_faults"] = "sample", held, about
+    figure = by_input(campaign)
+    figure.draw_without_rendering()
+    (axes,) = (each for each in figure.axes if each.get_xlabel() == "faults")
+    ticks = axes.get_xticklabels()
+    assert ["".join(tick.get_text().split()) for tick in ticks] == [
+        each.replace(" ", "") for each in faults
+    ]
+    boxes = [tick.get_window_extent() for tick in ticks]
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
+    assert axes.get_window_extent().height > 100.0
 
 
 def test_no_figure_drops_a_sample_in_silence(mixed: xr.Dataset) -> None:

@@ -303,8 +303,7 @@ def by_input(campaign: xr.Dataset) -> Figure:
         if not known.size or (height == foot).any():
             axes.axhline(low - 0.08 * size, color=style.GREY, linewidth=0.8)
         if labels:
-            axes.set_xticks(range(len(labels)), [textwrap.shorten(w, 18) for w in labels])
-            axes.set_xlim(-0.5, len(labels) - 0.5)
+            _name_words(axes, labels)
         else:
             axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
             axes.xaxis.set_major_locator(MaxNLocator(5))
@@ -325,6 +324,32 @@ def by_input(campaign: xr.Dataset) -> Figure:
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
     head(figure, campaign, "Outcome by input", f"{count}{below}.{note}")
     return figure
+
+
+_LETTERS, _LINES = 42, 22
+"""Letters, 7.5 points high, side by side along an axis of inputs; lines of upright ones."""
+_NARROWEST, _UPRIGHT = 10, 22
+"""Letters in a line of words side by side, below which they stand upright; of upright ones."""
+
+
+def _name_words(axes: Axes, labels: list[str]) -> None:
+    """Ticks at words: in lines below each other where they are long, upright where many."""
+    axes.set_xlim(-0.5, len(labels) - 0.5)
+    width, lines = _LETTERS // len(labels) - 1, 6
+    longest = max(map(len, labels))
+    if upright := width < min(longest, _NARROWEST):
+        width, lines = _UPRIGHT, max(1, _LINES // len(labels))
+    texts = [_broken(each, width, lines) for each in labels]
+    size = 9.5 if longest < 0.8 * width and not upright else 7.5
+    axes.set_xticks(range(len(labels)), [style.plain(text) for text in texts],
+                    rotation="vertical" if upright else "horizontal", fontsize=size)  # fmt: skip
+
+
+def _broken(word: str, width: int, most: int) -> str:
+    """A word in so many lines of some width: broken at a bracket, hyphens, and signs in between."""
+    pieces = word.replace("(", " (", 1).split(" ")
+    pieces = [each if len(each) <= width else each.replace("=", "= ") for each in pieces]
+    return "\n".join(textwrap.wrap(" ".join(pieces), width, max_lines=most, placeholder=" ..."))
 
 
 def _together(column: tuple[NDArray[np.floating], list[str]], height: Array) -> float:
