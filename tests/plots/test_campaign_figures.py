@@ -367,7 +367,7 @@ def test_a_sheet_has_the_panels_that_matter_and_names_the_others() -> None:
     names, told = shown(campaign)
     assert len(names) == 9
     assert names[0] == "total_motor_energy"
-    others = told.removesuffix(".").partition("Not drawn: ")[2].split(", ")
+    others = told.removesuffix(".").partition("Not drawn for want of room: ")[2].split(", ")
     assert others[0]
     assert not set(others) & set(names)
     assert sum(axes.get_visible() for axes in convergence(campaign).axes) == 9

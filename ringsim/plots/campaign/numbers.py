@@ -123,8 +123,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
 
 
 _POINTS = 400
-_MOST_REQUIRED = 6
-"""Requirements on a sheet of ``MOST_PANELS``, which leaves numbers a row."""
+_MOST_REQUIRED, _LEAST_NUMBERS = 9, 3
+"""Requirements on a sheet at most, and numbers for which they leave room: a row."""
 _INTERVALS = 12
 """Points of the band: each costs a bootstrap."""
 
@@ -184,6 +184,12 @@ def _required(campaign: xr.Dataset) -> Mapping[str, Requirement]:
     }  # fmt: skip
 
 
+def _met_most(campaign: xr.Dataset, wanted: Mapping[str, Requirement]) -> list[str]:
+    """Names of requirements, those that the largest share of samples meets last."""
+    held = good(campaign)
+    return sorted(wanted, key=lambda n: -violations(campaign, n, wanted[n])[held].sum())
+
+
 @picture(
     "campaign", 100,
     "Mean, 95 % quantile and probability of each requirement as samples come in",
@@ -195,11 +201,20 @@ def convergence(campaign: xr.Dataset) -> Figure:
     Means have their interval where the design allows it, probabilities the bounds of verdicts.
     """
     placed, wanted = placement(campaign), _required(campaign)
+    untold = [name for name in required_by(campaign.attrs) if name not in wanted]
     campaign, blocks = standing(campaign)
-    names, flat = shown(campaign, MOST_PANELS - min(len(wanted), _MOST_REQUIRED))
-    if others := [*wanted][_MOST_REQUIRED:]:
-        flat += f" Not drawn: the requirements of {', '.join(others)}."
-        wanted = {name: wanted[name] for name in [*wanted][:_MOST_REQUIRED]}
+    room = max(MOST_PANELS - len(wanted), _LEAST_NUMBERS)
+    names, flat = shown(campaign, room, "mean and quantile of ")
+    if others := _met_most(campaign, wanted)[_MOST_REQUIRED:]:
+        flat += (
+            " Not drawn, as at least as many samples meet them as any other: the requirements of "
+            f"{', '.join(others)}."
+        )
+        wanted = {name: each for name, each in wanted.items() if name not in others}
+    if untold:
+        flat += (
+            f" Not drawn, as not all samples tell of them: the requirements of {', '.join(untold)}."
+        )
     count = len(names) + len(wanted)
     figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3)
     for axes, name in zip(panels, names, strict=False):
