@@ -447,14 +447,12 @@ _LETTER, _APART = 6.2, 6.0
 
 def few_ticks(axes: Axes, most: int = 5) -> None:
     """Ticks along x, fewer where their labels are long: these do not run into each other."""
-    axis, columns = axes.xaxis, axes.get_subplotspec()
-    share = 0.75 / (columns.get_gridspec().ncols if columns is not None else 1)
-    points = 72.0 * share * axes.get_figure(root=True).get_size_inches()[0]
+    axis, points = axes.xaxis, 72.0 * axes.bbox.width / axes.figure.dpi
     low, high = sorted(axis.get_view_interval())
     for count in range(most, 1, -1):
         axis.set_major_locator(MaxNLocator(count))
         places = axis.get_majorticklocs()
-        words = axis.get_major_formatter().format_ticks(places)
+        words = axis.get_major_formatter().format_ticks(places.tolist())
         longest = max(map(len, words), default=0)
         step = np.diff(places).min(initial=high - low)
         if points * step >= (high - low) * (_LETTER * longest + _APART):
