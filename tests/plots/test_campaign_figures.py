@@ -203,6 +203,7 @@ def test_a_campaign_without_asynchrony_has_no_fan() -> None:
 def test_the_margin_by_ending_and_over_the_angle() -> None:
     campaign = with_motors(made_campaign(8, stalled=(4, 6), failed=(2,)))
     upper, lower = margin(campaign).axes
+    assert "linear to 1" in lower.get_ylabel()
     strips = dict(
         zip([t.get_text() for t in upper.get_yticklabels()], upper.collections, strict=True)
     )
