@@ -446,13 +446,19 @@ _LETTER, _APART = 6.2, 6.0
 
 
 def few_ticks(axes: Axes, most: int = 5) -> None:
-    """Ticks along x, fewer where their labels are long: these do not run into each other."""
+    """Ticks along x, fewer where their labels are long: these do not run into each other.
+
+    Called when the axis has its name: stress gets the labels of ``in_readable_units``.
+    """
     axis, points = axes.xaxis, 72.0 * axes.bbox.width / axes.figure.dpi
     low, high = sorted(axis.get_view_interval())
+    told = axis.get_major_formatter()
+    if _PASCAL in axis.get_label_text():
+        told = FuncFormatter(partial(_scaled, readable("Pa", max(abs(low), abs(high)))[0]))
     for count in range(most, 1, -1):
         axis.set_major_locator(MaxNLocator(count))
         places = axis.get_majorticklocs()
-        words = axis.get_major_formatter().format_ticks(places.tolist())
+        words = told.format_ticks(places.tolist())
         longest = max(map(len, words), default=0)
         step = np.diff(places).min(initial=high - low)
         if points * step >= (high - low) * (_LETTER * longest + _APART):

@@ -105,8 +105,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         style.plain_numbers(axes.xaxis)
-        style.few_ticks(axes)
         axes.set_xlabel(style.label(campaign[name], width=38))
+        style.few_ticks(axes)
         words = f"n = {len(values)} of {campaign.sizes['sample']}"
         axes.set_title(words, fontsize=9, pad=16.0 if limited else None)
         if number % columns == 0:
