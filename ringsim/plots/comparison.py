@@ -138,8 +138,8 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         style.plain_numbers(axes.xaxis)
-        style.few_ticks(axes)
         axes.set_xlabel(style.label(both[0][name], width=38), fontsize=9)
+        style.few_ticks(axes)
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
     legend(figure, panels)

@@ -446,16 +446,19 @@ _LETTER, _APART = 6.2, 6.0
 
 
 def few_ticks(axes: Axes, most: int = 5) -> None:
-    """Ticks along x, fewer where their labels are long: these do not run into each other."""
-    axis, columns, figure = axes.xaxis, axes.get_subplotspec(), axes.get_figure(root=True)
-    assert figure is not None
-    share = 0.75 / (columns.get_gridspec().ncols if columns is not None else 1)
-    points = 72.0 * share * figure.get_size_inches()[0]
+    """Ticks along x, fewer where their labels are long: these do not run into each other.
+
+    Called when the axis has its name: stress gets the labels of ``in_readable_units``.
+    """
+    axis, points = axes.xaxis, 72.0 * axes.bbox.width / axes.figure.dpi
     low, high = sorted(axis.get_view_interval())
+    told = axis.get_major_formatter()
+    if _PASCAL in axis.get_label_text():
+        told = FuncFormatter(partial(_scaled, readable("Pa", max(abs(low), abs(high)))[0]))
     for count in range(most, 1, -1):
         axis.set_major_locator(MaxNLocator(count))
         places = axis.get_majorticklocs()
-        words = axis.get_major_formatter().format_ticks(places.tolist())
+        words = told.format_ticks(places.tolist())
         longest = max(map(len, words), default=0)
         step = np.diff(places).min(initial=high - low)
         if points * step >= (high - low) * (_LETTER * longest + _APART):

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from made_campaign import SECTIONS, TIMES, lags, made_campaign
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ringsim.analysis import courses as courses_module
 from ringsim.analysis import design as blocks_module
@@ -48,6 +49,9 @@ def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
         largest = np.abs(worst.get_ydata()).max()
         assert largest == pytest.approx(np.abs(lags(6)[plane, section]), abs=1e-5)
     assert "worst: sample 6" in legend_of(figure)
+    lines = [each for each in figure.legends[0].legend_handles if isinstance(each, Line2D)]
+    dashed = {each.get_label(): each.get_linestyle() for each in lines}
+    assert dashed["worst: sample 6"] != dashed["median"]
     assert figure.axes[-1].get_xlabel().startswith("Time since")
     figure.draw_without_rendering()
     box = figure.legends[0].get_window_extent()

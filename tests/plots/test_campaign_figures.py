@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -136,6 +137,26 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     assert places.tolist() == [0, 1] * 4
 
 
+@pytest.mark.parametrize("count", [2, 3, 4, 7])
+def test_words_of_inputs_are_whole_and_stand_apart(count: int) -> None:
+    campaign = made_campaign(8)
+    faults = [f"failed-latch(plane=upper, section={k}, time=0.5)" for k in range(count - 1)]
+    faults = [*faults, "none"]
+    about = {"role": "input", "input": "faults", "units": "1"}
+    held = np.array([faults[k % count] for k in range(8)], dtype=object)
+    campaign["input_faults"] = "sample", held, about
+    figure = by_input(campaign)
+    figure.draw_without_rendering()
+    (axes,) = (each for each in figure.axes if each.get_xlabel() == "faults")
+    ticks = axes.get_xticklabels()
+    assert ["".join(tick.get_text().split()) for tick in ticks] == [
+        each.replace(" ", "") for each in faults
+    ]
+    boxes = [tick.get_window_extent() for tick in ticks]
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
+    assert axes.get_window_extent().height > 100.0
+
+
 def test_no_figure_drops_a_sample_in_silence(mixed: xr.Dataset) -> None:
     for picture, figure in figures_of(with_motors(mixed)):
         told = words(figure)
@@ -182,6 +203,7 @@ def test_a_campaign_without_asynchrony_has_no_fan() -> None:
 def test_the_margin_by_ending_and_over_the_angle() -> None:
     campaign = with_motors(made_campaign(8, stalled=(4, 6), failed=(2,)))
     upper, lower = margin(campaign).axes
+    assert "linear to 1" in lower.get_ylabel()
     strips = dict(
         zip([t.get_text() for t in upper.get_yticklabels()], upper.collections, strict=True)
     )
@@ -346,7 +368,7 @@ def test_a_sheet_has_the_panels_that_matter_and_names_the_others() -> None:
     names, told = shown(campaign)
     assert len(names) == 9
     assert names[0] == "total_motor_energy"
-    others = told.removesuffix(".").partition("Not drawn: ")[2].split(", ")
+    others = told.removesuffix(".").partition("Not drawn for want of room: ")[2].split(", ")
     assert others[0]
     assert not set(others) & set(names)
     assert sum(axes.get_visible() for axes in convergence(campaign).axes) == 9

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from scipy.stats import binomtest, t
 
 from ringsim.analysis.study import analyse
+from ringsim.outputs.family import VARIABLES
 from ringsim.plots.campaign.numbers import convergence
 
 GOOD = [0, 1, 3, 4, 6]
@@ -115,3 +116,25 @@ def test_a_requirement_has_its_probability_with_the_bounds_of_its_verdict() -> N
         np.testing.assert_allclose(drawn_at[[0, -1]], sides)
     titles = [a.get_title(loc="left") for a in figure.axes]
     assert "asynchrony_max <= 3 degree\nn = 29" in titles
+
+
+def test_requirements_that_fail_are_drawn_and_what_is_left_out_has_its_reason() -> None:
+    campaign = made_campaign(16)
+    numbers = [n for n, each in VARIABLES.items() if each.summary is not None][:12]
+    for k, name in enumerate(numbers):
+        campaign[name] = "sample", np.arange(16.0) + k
+    about = {"min": 15.5, "probability": 0.9, "confidence": 0.9}
+    campaign.attrs["requirements"] = json.dumps(dict.fromkeys(numbers[::-1], about))
+    figure = convergence(campaign)
+    titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
+    drawn = [name for name in numbers if any(title.startswith(f"{name} >=") for title in titles)]
+    assert drawn == numbers[:9]
+    assert len(titles) == 12
+    told = words(figure).partition("as at least as many samples meet them as any other: ")[2]
+    left = told.partition(".")[0].removeprefix("the requirements of ").split(", ")
+    assert sorted(left) == sorted(numbers[9:])
+    assert "for want of room: mean and quantile of " in words(figure)
+    campaign[numbers[0]][3] = np.nan
+    assert f"not all samples tell of them: the requirements of {numbers[0]}." in words(
+        convergence(campaign)
+    )

@@ -84,8 +84,10 @@ _APART = 1e-3
 tables give changes."""
 
 
-def shown(campaign: xr.Dataset, most: int = MOST_PANELS) -> tuple[list[str], str]:
+def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tuple[list[str], str]:
     """So many main numbers that differ between samples or have limits, and a word on others.
+
+    ``what`` is what the figure draws of each, where that is not all.
 
     All count if none differs.  Those with limits go first if there are more.
     """
@@ -109,7 +111,7 @@ def shown(campaign: xr.Dataset, most: int = MOST_PANELS) -> tuple[list[str], str
         names = [name for name in names if name not in flat]
     if len(names) > most:
         names.sort(key=lambda name: name not in limited)
-        told += f" Not drawn: {', '.join(names[most:])}."
+        told += f" Not drawn for want of room: {what}{', '.join(names[most:])}."
     return names[:most], told
 
 

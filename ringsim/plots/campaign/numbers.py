@@ -105,8 +105,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         style.plain_numbers(axes.xaxis)
-        axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.set_xlabel(style.label(campaign[name], width=38))
+        style.few_ticks(axes)
         words = f"n = {len(values)} of {campaign.sizes['sample']}"
         axes.set_title(words, fontsize=9, pad=16.0 if limited else None)
         if number % columns == 0:
@@ -123,8 +123,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
 
 
 _POINTS = 400
-_MOST_REQUIRED = 6
-"""Requirements on a sheet of ``MOST_PANELS``, which leaves numbers a row."""
+_MOST_REQUIRED, _LEAST_NUMBERS = 9, 3
+"""Requirements on a sheet at most, and numbers for which they leave room: a row."""
 _INTERVALS = 12
 """Points of the band: each costs a bootstrap."""
 
@@ -184,6 +184,12 @@ def _required(campaign: xr.Dataset) -> Mapping[str, Requirement]:
     }  # fmt: skip
 
 
+def _met_most(campaign: xr.Dataset, wanted: Mapping[str, Requirement]) -> list[str]:
+    """Names of requirements, those that the largest share of samples meets last."""
+    held = good(campaign)
+    return sorted(wanted, key=lambda n: -violations(campaign, n, wanted[n])[held].sum())
+
+
 @picture(
     "campaign", 100,
     "Mean, 95 % quantile and probability of each requirement as samples come in",
@@ -195,11 +201,20 @@ def convergence(campaign: xr.Dataset) -> Figure:
     Means have their interval where the design allows it, probabilities the bounds of verdicts.
     """
     placed, wanted = placement(campaign), _required(campaign)
+    untold = [name for name in required_by(campaign.attrs) if name not in wanted]
     campaign, blocks = standing(campaign)
-    names, flat = shown(campaign, MOST_PANELS - min(len(wanted), _MOST_REQUIRED))
-    if others := [*wanted][_MOST_REQUIRED:]:
-        flat += f" Not drawn: the requirements of {', '.join(others)}."
-        wanted = {name: wanted[name] for name in [*wanted][:_MOST_REQUIRED]}
+    room = max(MOST_PANELS - len(wanted), _LEAST_NUMBERS)
+    names, flat = shown(campaign, room, "mean and quantile of ")
+    if others := _met_most(campaign, wanted)[_MOST_REQUIRED:]:
+        flat += (
+            " Not drawn, as at least as many samples meet them as any other: the requirements of "
+            f"{', '.join(others)}."
+        )
+        wanted = {name: each for name, each in wanted.items() if name not in others}
+    if untold:
+        flat += (
+            f" Not drawn, as not all samples tell of them: the requirements of {', '.join(untold)}."
+        )
     count = len(names) + len(wanted)
     figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3)
     for axes, name in zip(panels, names, strict=False):
@@ -303,8 +318,7 @@ def by_input(campaign: xr.Dataset) -> Figure:
         if not known.size or (height == foot).any():
             axes.axhline(low - 0.08 * size, color=style.GREY, linewidth=0.8)
         if labels:
-            axes.set_xticks(range(len(labels)), [textwrap.shorten(w, 18) for w in labels])
-            axes.set_xlim(-0.5, len(labels) - 0.5)
+            _name_words(axes, labels)
         else:
             axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
             axes.xaxis.set_major_locator(MaxNLocator(5))
@@ -325,6 +339,32 @@ def by_input(campaign: xr.Dataset) -> Figure:
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
     head(figure, campaign, "Outcome by input", f"{count}{below}.{note}")
     return figure
+
+
+_LETTERS, _LINES = 42, 22
+"""Letters, 7.5 points high, side by side along an axis of inputs; lines of upright ones."""
+_NARROWEST, _UPRIGHT = 10, 22
+"""Letters in a line of words side by side, below which they stand upright; of upright ones."""
+
+
+def _name_words(axes: Axes, labels: list[str]) -> None:
+    """Ticks at words: in lines below each other where they are long, upright where many."""
+    axes.set_xlim(-0.5, len(labels) - 0.5)
+    width, lines = _LETTERS // len(labels) - 1, 6
+    longest = max(map(len, labels))
+    if upright := width < min(longest, _NARROWEST):
+        width, lines = _UPRIGHT, max(1, _LINES // len(labels))
+    texts = [_broken(each, width, lines) for each in labels]
+    size = 9.5 if longest < 0.8 * width and not upright else 7.5
+    axes.set_xticks(range(len(labels)), [style.plain(text) for text in texts],
+                    rotation="vertical" if upright else "horizontal", fontsize=size)  # fmt: skip
+
+
+def _broken(word: str, width: int, most: int) -> str:
+    """A word in so many lines of some width: broken at a bracket, hyphens, and signs in between."""
+    pieces = word.replace("(", " (", 1).split(" ")
+    pieces = [each if len(each) <= width else each.replace("=", "= ") for each in pieces]
+    return "\n".join(textwrap.wrap(" ".join(pieces), width, max_lines=most, placeholder=" ..."))
 
 
 def _together(column: tuple[NDArray[np.floating], list[str]], height: Array) -> float:
