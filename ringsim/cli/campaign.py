@@ -58,7 +58,7 @@ from ringsim.variables import GOALS, TIMINGS, Outcome
 @click.option(
     "--dry-run",
     is_flag=True,
-    help="Check the file, and show what would run and its predicted cost; store nothing.",
+    help="Check the file, time one sample, and show what would run and its cost; store nothing.",
 )
 @click.option("--plot", is_flag=True, help="Draw figures beside campaign.nc.")
 @PLOT_FORMAT

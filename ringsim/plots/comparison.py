@@ -182,8 +182,8 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
 
 
 _OF_ALL = (
-    "Lines are medians, bands 5 to 95 % of all samples. What is over counts on: a deployed ring\n"
-    "with 180 deg and in step, everything else with its last value."
+    "Lines are medians, bands 5 to 95 % of all samples. After its end a run counts on: a deployed\n"
+    "ring with 180 deg and in step, everything else with its last value."
 )
 _DEPLOYED = {"opening_angle": 180.0, "asynchrony": 0.0}
 """What a deployed ring has: its last record may be before its last lock."""

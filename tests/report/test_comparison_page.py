@@ -148,7 +148,7 @@ def test_what_is_over_counts_on_in_the_courses(both: tuple[xr.Dataset, xr.Datase
     held = tensions.max(axis=(1, 2))[..., ~late][:, -1]
     ends = np.append(held[:3], tensions[3].max(axis=(0, 1))[-1])
     assert tension[-1] == pytest.approx(np.median(ends))
-    assert "What is over counts on" in figure.legends[0].get_title().get_text()
+    assert "After its end a run counts on" in figure.legends[0].get_title().get_text()
 
 
 def test_samples_that_were_cut_off_are_told_and_what_differs_comes_first(
