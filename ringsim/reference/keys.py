@@ -15,6 +15,7 @@ import annotated_types
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from ringsim.cable.faults import CableFault
 from ringsim.refusal import models_in
 from ringsim.units import EACH, LEFT_OUT, Model, nested_in, unit_of
 
@@ -105,6 +106,11 @@ class Key:
         return "list" if (tuple in origins or list in origins) and not self.each else ""
 
     @property
+    def takes_a_name(self) -> bool:
+        """Whether a name may stand for its number, see ``ringsim.cable.records``."""
+        return issubclass(self.owner, CableFault) and self.name in ("pulley", "span")
+
+    @property
     def each(self) -> bool:
         """Whether it may be a list with a value for every section, corner or pulley."""
         return any(getattr(part, "tag", None) == EACH for part in nested_in(self.field.annotation))
@@ -127,7 +133,7 @@ class Key:
         if self.choices:
             return " or ".join(map(json.dumps, self.choices))
         annotation = self.field.annotation
-        if self.attribute == "pulley":  # names become numbers before a fault is made
+        if self.takes_a_name:
             return "name, or whole number"
         what = " or ".join(dict.fromkeys(_plain(annotation))) or "any value"
         if self.holder == "names" and typing.get_origin(annotation) is dict:

@@ -14,7 +14,7 @@ from ringsim.cable.faults import CableFault
 from ringsim.cable.friction import PulleyFriction
 from ringsim.cable.records import CABLES
 from ringsim.choice import OneOf, kinds_of
-from ringsim.reference.keys import keys_of, words_of
+from ringsim.reference.keys import Key, keys_of, words_of
 from ringsim.reference.tree import ROOTS, facts
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.units import LEFT_OUT, Model
@@ -64,21 +64,21 @@ class _Schema(GenerateJsonSchema):
         for key in keys_of(model):
             one = properties[key.name]
             one["description"] = "\n".join(filter(None, [key.meaning, facts(key)]))
-            for other in _in_words(model, key.name):
+            for other in _in_words(key):
                 one = properties[key.name] = _either(one, other)
             if key.attribute in model.parts():
                 properties[key.name] = _either(one, {"const": LEFT_OUT})
         return made
 
 
-def _in_words(model: type[Model], name: str) -> list[JsonSchemaValue]:
+def _in_words(key: Key) -> list[JsonSchemaValue]:
     """What a key of places on cables may also be: their names; see ``ringsim.cable.records``."""
-    if issubclass(model, PulleyFriction) and name == "coefficient":
+    if issubclass(key.owner, PulleyFriction) and key.name == "coefficient":
         numbers = {"type": "object", "additionalProperties": {"type": "number"}}
         return [numbers | {"required": ["default"]}]
-    if issubclass(model, CableFault) and name in ("pulley", "span"):
+    if key.takes_a_name:
         return [{"type": "string"}]
-    if issubclass(model, CableFault) and name == "cable":
+    if issubclass(key.owner, CableFault) and key.name == "cable":
         return [{"enum": list(CABLES)}]
     return []
 
