@@ -34,6 +34,12 @@ class InputError(ValueError):
         super().__init__("".join(c if c.isprintable() else ascii(c)[1:-1] for c in line))
 
 
+class NotBuiltError(RuntimeError):
+    """The core has not been compiled where this package lies, or of other sources: no input is
+    wrong, and no other engine may take its place unasked.
+    """
+
+
 _SAYS = {
     "missing": "{where} is missing: give it a value{in_unit}",
     "greater_than": "{shown} must be above {gt:g}{unit}",

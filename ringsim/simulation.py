@@ -18,7 +18,7 @@ from ringsim.choice import kind_of
 from ringsim.outputs.balance import with_bars
 from ringsim.outputs.recorder import StoredState
 from ringsim.parts.solver import Solver
-from ringsim.refusal import InputError, known_or_nearest, show
+from ringsim.refusal import InputError, NotBuiltError, known_or_nearest, show
 from ringsim.rigid.margin import with_margin
 from ringsim.scene import Scene, load_scene
 from ringsim.scene.substituted import substituted
@@ -67,6 +67,9 @@ def prepare_run(scene: Scene) -> None:
     import ringsim.exudyn.integrate  # noqa: F401
 
 
+_REFUSED = InputError, NotBuiltError
+
+
 def run_frame(
     scene: Scene, watch: Watch | None = None, start: StoredState | None = None
 ) -> Outcome:  # fmt: skip
@@ -82,12 +85,12 @@ def run_frame(
     from ringsim.frame.integrate import solve
 
     if start is None and scene.record.state_interval is None:
-        return _run(solve, Fidelity.FRAME, scene, watch, refusal=(InputError,))
+        return _run(solve, Fidelity.FRAME, scene, watch, _REFUSED)
     from ringsim.frame.integrate import solve_and_store as solve_storing
 
     storing = partial(solve_storing, start=start)
     before = [] if start is None else start.scenes
-    outcome = _run(storing, Fidelity.FRAME, scene, watch, (InputError,), before)
+    outcome = _run(storing, Fidelity.FRAME, scene, watch, _REFUSED, before)
     return outcome if start is None else replace(outcome, began=start.told(scene))
 
 
@@ -128,7 +131,8 @@ def _refuse_other_rods(scene: Scene) -> None:
 @one_thread()
 def _run(
     solve: Solve, fidelity: Fidelity, scene: Scene, watch: Watch | None,
-    refusal: tuple[type[InputError], ...] = (), before: Sequence[tuple[float, Scene]] = (),
+    refusal: tuple[type[Exception], ...] = (NotBuiltError,),
+    before: Sequence[tuple[float, Scene]] = (),
 ) -> Outcome:  # fmt: skip
     """Run a scene with an engine, which may raise what is a ``refusal``; it had other scenes
     ``before``, each until a time (s).

@@ -10,7 +10,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE, EXIT_INTERRUPTED
-from ringsim.refusal import InputError, known_or_nearest
+from ringsim.refusal import InputError, NotBuiltError, known_or_nearest
 
 VERBS = {
     "scenes": "List the built-in scenes.",
@@ -71,7 +71,7 @@ class _Verbs(click.Group):
         """Turn refused input into one line and its exit code."""
         try:
             return super().invoke(ctx)
-        except InputError as error:
+        except (InputError, NotBuiltError) as error:
             click.echo(str(error), err=True)
             ctx.exit(EXIT_BAD_INPUT)
         except UnicodeEncodeError as error:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, TypeVar, cast, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.refusal import InputError
+from ringsim.refusal import NotBuiltError
 
 _FOLDER = Path(__file__).parent / "c"
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
@@ -74,10 +74,6 @@ _KINDS = {NDArray[np.float64]: "a", NDArray[np.int64]: "n", float: "r", int: "w"
 """The same of fields of tables, by their annotations."""
 _MOST_KNOWN = 64
 """Packed tables that are kept at most."""
-
-
-class NotBuiltError(InputError):
-    """The core has not been compiled where this package lies, or of other sources."""
 
 
 @cache

@@ -12,11 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from ringsim.cli import cli
 from ringsim.core import library
-from ringsim.core.library import NotBuiltError, call
+from ringsim.core.library import call
 from ringsim.core.tension import Drums, RopeTable, Spans
 from ringsim.core.turning import Seen
+from ringsim.exit_codes import EXIT_BAD_INPUT
 from ringsim.frame import elimination
 from ringsim.frame.cables import Arms, Laws, Lines, Roped
 from ringsim.frame.elimination import Border, Fronts
@@ -26,7 +29,9 @@ from ringsim.frame.model import FrameModel, System
 from ringsim.frame.rods import Pose, Strains
 from ringsim.frame.springs import Web
 from ringsim.frame.state import Coefficients, Followed, Held, Moving
+from ringsim.refusal import NotBuiltError
 from ringsim.scene import load_scene
+from ringsim.simulation import simulate
 
 # It stands beside pyproject.toml, and needs setuptools, which a run does not.
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -88,6 +93,21 @@ def test_a_library_of_other_sources_is_not_taken(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(library, "_digest", lambda: "0123")
     with pytest.raises(NotBuiltError, match="was compiled from other sources: run pip install"):
         library._library.__wrapped__()
+
+
+@pytest.mark.quick
+def test_no_other_engine_takes_the_place_of_a_core_that_is_not_built(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(name: str) -> None:
+        raise NotBuiltError("the core is not compiled here")
+
+    monkeypatch.setattr(library, "_function", refuse)
+    done = CliRunner().invoke(cli, ["run", "ring18"], standalone_mode=False)
+    assert (done.return_value, done.stdout) == (EXIT_BAD_INPUT, "")
+    assert done.stderr == "the core is not compiled here\n"
+    with pytest.raises(NotBuiltError):
+        simulate("ring18")
 
 
 def test_a_very_long_ring_has_a_tangent() -> None:
