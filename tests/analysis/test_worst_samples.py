@@ -11,6 +11,8 @@ import xarray as xr
 from made_campaign import made_campaign
 
 from made import campaign
+from ringsim.analysis.design import placement
+from ringsim.analysis.influence import influence
 from ringsim.analysis.influence_text import what_separates
 from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
@@ -159,6 +161,34 @@ def test_a_sample_on_the_other_side_is_not_told_by_what_separates_the_rest() -> 
     assert "temperature" not in first
     assert "faults = stuck-vjoint (as in 10 of 400)" in first
     assert all(row.startswith("temperature") for row in others)
+
+
+def test_a_drawn_fault_comes_before_rarer_numbers() -> None:
+    random = np.random.default_rng(4)
+    stuck, noise = np.arange(60) % 12 == 0, random.random((60, 5))
+    noise[0] = 9.0  # the largest of each
+    one = stalled_by(stuck, np.full(60, 293.0), noise)
+    told, *_ = unusual(one, [0])
+    assert told.startswith("faults = stuck-vjoint (as in 5 of 60); noise")
+
+
+@pytest.mark.parametrize(("sense", "bound"), [(1.0, {"max": -4.0}), (-1.0, {"min": 4.0})])
+def test_where_nearly_all_fail_what_goes_with_the_output_is_named(sense, bound) -> None:
+    """Larger x makes it worse; a sample that is bad with a small x is not told by it."""
+    random = np.random.default_rng(5)
+    x = random.random(200)
+    values = sense * (np.where(np.arange(200) < 3, -5.0, x))  # all but three are beyond
+    values[7], x[7] = sense * 2.0, 0.3
+    one = campaign(values)
+    for name, column in ("x", x), ("y", random.random(200)):
+        one[name] = "sample", column, {"role": "input", "path": name, "units": "m"}
+    wanted = read_requirements({"asynchrony_max": bound | BOUND}, "file")
+    found = worst(one, wanted, influence(one, wanted, placement(one)))
+    first, *others = found.worst_inputs.values.tolist()
+    assert found.worst_sample.values[0] == 7
+    assert "x " not in first
+    assert len(others) == 2
+    assert all(each.startswith("x ") for each in others)
 
 
 def test_analysis_and_accessor_tell_the_same_and_how_to_run_them() -> None:

@@ -236,6 +236,12 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
             start += f"{further} further sample"
             assert any(each.startswith(start) for each in lines)
             assert not lost or any(f"if the {lost} failed run" in each for each in lines)
+        probable = [each for each in lines if each.startswith(f"{name}: violated with a prob")]
+        assert len(probable) == (bad > 0)
+        for each in probable:
+            numbers = [float(n) for n in re.findall(r"\d[\d.e-]*", each.removeprefix(name))]
+            for number, value in zip(numbers, (bad / used, 1 - ends[1], 1 - ends[0]), strict=True):
+                assert number == pytest.approx(value, rel=1e-3, abs=1e-12)
         if name == "outcome":
             continue
         absent = int((file.ok & np.isnan(file.values[name])).sum())

@@ -129,6 +129,14 @@ def test_files_of_a_campaign_are_not_replaced(tmp_path: Path) -> None:
         assert (tmp_path / name).read_text() == "kept"
 
 
+def test_limits_of_the_scene_are_told_where_they_belong(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(CAMPAIGN + "[limits]\ntension = 60.0\n")
+    assert '(that is a limit of the scene: [set] "limits.tension" = VALUE)' in refused(
+        "campaign", path
+    )
+
+
 def test_a_file_without_end_is_refused() -> None:
     assert refused("check", "/dev/zero").startswith("/dev/zero: longer than 50,000,000 letters")
 
