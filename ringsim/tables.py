@@ -1,6 +1,7 @@
 """Tables, in Markdown and for terminals."""
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from typing import NamedTuple
@@ -100,17 +101,20 @@ def number_text(value: float, digits: int = 4) -> str:
 
 
 def interval_text(low: float, high: float, digits: int = 4) -> str:
-    """Both ends of an interval without digits beyond its half, or a dash.
+    """Both ends of an interval without digits beyond its half, equally many, or a dash.
 
-    >>> interval_text(6.4463, 6.7259), interval_text(1.0, math.inf)
-    ('6.45 .. 6.73', '1 .. -')
+    >>> interval_text(6.4463, 6.7259), interval_text(1.0, math.inf), interval_text(0.6511, 0.8976)
+    ('6.45 .. 6.73', '1 .. -', '0.65 .. 0.90')
     """
     if not (math.isfinite(low) or math.isfinite(high)):
         return "-"
     half = 0.5 * (high - low)
-    return " .. ".join(
-        known_to(number_text(end, digits), half, ".1e", end, least=0) for end in (low, high)
-    )
+    ends = [known_to(number_text(end, digits), half, ".1e", end, least=0) for end in (low, high)]
+    if all(re.fullmatch(r"-?\d+(\.\d+)?", end) for end in ends):
+        # Zeros that .g drops say as much as other digits: 45.63 .. 46.30.
+        longest = max(len(end.partition(".")[2]) for end in ends)
+        ends = [f"{Decimal(end):.{longest}f}" for end in ends]
+    return " .. ".join(ends)
 
 
 def estimate_text(value: float, low: float, high: float, digits: int = 4) -> str:

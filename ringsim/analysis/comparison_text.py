@@ -24,6 +24,8 @@ _NAMED = 20
 """Changed outcomes, and values of scenes, that are listed at most."""
 _ALIKE = 1e-3
 """Difference over the larger mean below which neither is told to be worse, however sure it is."""
+_FRACTIONS = 999.5
+"""Percent from which on three digits would take an exponent."""
 _SHORT = 16
 """Letters of a name up to which it heads columns."""
 
@@ -108,6 +110,10 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
     all samples where there are no shares.
     """
     rows, single = [], found.attrs["runs"]
+    if single and dim == "kind":
+        counts = found["kind_samples"].values.T.astype(bool)
+        ends = tuple(str(found["kind"].values[own][0]) for own in counts)
+        return Table(("", *names_of(found)), [(head, *ends)], left=3)
     for name in found[dim].values if dim in found.dims else ():
         one = {str(n): v.values for n, v in found.sel({dim: name}).items()}
         shares, of = one[f"{word}_share"].tolist(), one[f"{word}_compared"].tolist()
@@ -128,11 +134,10 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
 def _changed(found: xr.Dataset) -> Table:
     """The pairs whose outcome is another one."""
     changed, pairs = found.sizes["change"], found.attrs["pairs"]
-    if not pairs:
+    if not pairs or found.attrs["runs"]:
         return Table((), ())
     if not changed:
-        same = "the outcome is the same" if found.attrs["runs"] else "no outcome differs"
-        return Table((), (), [same])
+        return Table((), (), ["no outcome differs"])
     names = ("changed_sample_first", "changed_outcome_first", "changed_outcome_second")
     listed = zip(*(found[name].values[:_NAMED] for name in names), strict=True)
     rows = [(str(sample), str(first), str(second)) for sample, first, second in listed]
@@ -192,7 +197,8 @@ def _percent(first: float, second: float) -> str:
     """The difference in percent of the first, where both have a sign in common."""
     if not first * second > NOTHING**2:
         return "-"
-    return f"{100.0 * (second - first) / abs(first):+.3g}"
+    percent = 100.0 * (second - first) / abs(first)
+    return f"{percent:+.3g}" if abs(percent) < _FRACTIONS else f"{percent:+.0f}"
 
 
 def _worse(found: xr.Dataset, name: str) -> str:

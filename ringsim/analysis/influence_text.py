@@ -85,7 +85,7 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         notes.append(f"the strongest of {len(names)} inputs are listed; by chance alone {chance}")
         notes += confounding_notes(analysis, named)
     head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
-    return marked(Table((*head, "used"), rows, notes), analysis)
+    return marked(Table((*head, "samples used"), rows, notes), analysis)
 
 
 def _separated(analysis: xr.Dataset) -> Table:

@@ -293,8 +293,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             held = one["samples_used"] - one["samples_violating"]
             hint = "" if OUTCOME in analysis["requirement"] else _HINT
             notes.append(
-                f"{name}: {short} of the {held} that meet it ended before their goal, and might "
-                f"have violated it later{hint}"
+                f"{name}: {short} of the {held} samples that meet it ended before the antenna was "
+                f"deployed, and might have violated it later{hint}"
             )
         if missing := one["samples_without_value"]:
             notes.append(
@@ -302,8 +302,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             )
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
-        "verdict", "estimate", _BOUND, "used", "violating", "failed runs",
-        "verdict without failed runs", "further",
+        "verdict", "estimate", _BOUND, "samples used", "violating", "failed runs",
+        "verdict without failed runs", "samples to go",
     )  # fmt: skip
     return marked(Table(head, rows, notes), analysis, head.index("estimate"))
 
@@ -343,7 +343,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
 
 
 def _parts() -> list[str]:
-    return [f"first {part:.0%}" for part in PARTS[:-1]]
+    return [f"in first {part:.0%}" for part in PARTS[:-1]]
 
 
 def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
@@ -379,7 +379,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
             ))  # fmt: skip
     head = (
         "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
-        "most", "worst sample", "used",
+        "most", "worst sample", "samples used",
     )  # fmt: skip
     notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
@@ -441,7 +441,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
             ))  # fmt: skip
     head = (
         "output", "unit", "statistic", "estimate", "95 % interval", "in sample",
-        "its error bar", *_parts(), "used", "failed runs", "no value",
+        "its error bar", *_parts(), "samples used", "failed runs", "no value",
     )  # fmt: skip
     return marked(Table(head, rows), analysis)
 

@@ -323,7 +323,7 @@ def tail_table(analysis: xr.Dataset) -> Table:
         rows.append((
             "in the event with the full engine only",
             f"{int(analysis['tail_missed'])} of {outside} repeated runs outside the event (the "
-            "nearest ones, and those that ended before their goal)",
+            "nearest ones, and those that ended before the antenna was deployed)",
         ))  # fmt: skip
     if (checked or outside) and not why:
         apart = analysis["tail_difference"]

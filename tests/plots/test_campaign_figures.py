@@ -344,9 +344,17 @@ def test_panels_are_for_numbers_that_differ_or_have_limits() -> None:
     campaign["deployment_time"] = "sample", np.linspace(10.0, 10.005, 8)
     names, flat = shown(campaign)
     assert "deployment_time" not in names
-    assert "same in all samples within 0.1 % or the numerical error: deployment_time" in flat
-    assert "within 0.1 % or the numerical error: deployment_time" in words(distributions(campaign))
-    assert "within 0.1 % or the numerical error: deployment_time" in words(convergence(campaign))
+    assert (
+        "samples differ by less than 0.1 %, or than their numerical error: deployment_time" in flat
+    )
+    assert (
+        "samples differ by less than 0.1 %, or than their numerical error: deployment_time"
+        in words(distributions(campaign))
+    )
+    assert (
+        "samples differ by less than 0.1 %, or than their numerical error: deployment_time"
+        in words(convergence(campaign))
+    )
     wanted = {"probability": 0.9, "confidence": 0.9}
     campaign["latched_joints"] = "sample", np.full(8, 6)
     campaign.attrs["requirements"] = json.dumps(

@@ -197,7 +197,7 @@ def outcomes(file: File, rows: list[dict[str, str]]) -> None:
         interval_agrees(row["95 % interval"], ends)
         for part in (25, 50, 75):
             first = run[: round(part / 100 * len(run))]
-            agrees(row[f"first {part}%"], own[first].sum() / of[first].sum())
+            agrees(row[f"in first {part}%"], own[first].sum() / of[first].sum())
 
 
 def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
@@ -206,7 +206,7 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
     for name, row in zip(file.wanted, rows, strict=True):
         level, share = file.wanted[name]["confidence"], file.wanted[name]["probability"]
         bad = int(file.violating(name).sum())
-        assert (row["used"], row["violating"], row["failed runs"]) == (
+        assert (row["samples used"], row["violating"], row["failed runs"]) == (
             str(used),
             str(bad),
             str(lost),
@@ -230,7 +230,7 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
         many = range(worse + 1, 10_000)
         needed = next(n for n in many if bound(n - worse, n, level)[0] >= share)
         further = needed - run if row["verdict"] == "not yet shown" else 0
-        assert row.get("further", "-") == (str(further) if further > 0 else "-")
+        assert row.get("samples to go", "-") == (str(further) if further > 0 else "-")
         if further > 0:
             start = f"{name}: {bad} of {used} violate it so far; " if bad else f"{name}: "
             start += f"{further} further sample"
@@ -251,7 +251,8 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
             (int(short.sum()), f"{name}: "),
         ):
             text = f"{words}{count}" if words.endswith("far): ") else (
-                f"{words}{count} of the {used - bad} that meet it ended before their goal"
+                f"{words}{count} of the {used - bad} samples that meet it "
+                "ended before the antenna was deployed"
             )  # fmt: skip
             assert any(each.startswith(text) for each in lines) == (count > 0), text
 
@@ -263,7 +264,9 @@ def outputs(file: File, rows: list[dict[str, str]]) -> None:
     for row in rows:
         name = row["output"]
         values, run = file.of(name), int((file.ok | file.lost).sum())
-        assert row["used"] == (str(run) if len(values) == run else f"{len(values)} of {run}")
+        assert row["samples used"] == (
+            str(run) if len(values) == run else f"{len(values)} of {run}"
+        )
         assert row["unit"] == ("" if file.units[name] == "1" else file.units[name])
         estimate_agrees(row["mean"], values.mean(), ends_of(row))
         near(row["95 % interval"], bootstrap(values, "mean"))
@@ -501,7 +504,7 @@ def statistics(file: File, rows: list[dict[str, str]]) -> None:
                 agrees(row["its error bar"], 0.01 * end, digits=2)
         if word not in ("minimum", "maximum"):
             assert row["in sample"] == row["its error bar"] == "-"
-        assert row["used"] == str(len(values))
+        assert row["samples used"] == str(len(values))
         assert row["failed runs"] == str(file.lost.sum())
         assert row["no value"] == str(file.ok.sum() - len(values))
 

@@ -106,8 +106,8 @@ def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tupl
     ]  # fmt: skip
     told = ""
     if flat and len(flat) < len(names):
-        within = f"{100 * _APART:g} % or the numerical error"
-        told = f" The same in all samples within {within}: {', '.join(flat)}."
+        within = f"by less than {100 * _APART:g} %, or than their numerical error"
+        told = f" Not drawn, because samples differ {within}: {', '.join(flat)}."
         names = [name for name in names if name not in flat]
     if len(names) > most:
         names.sort(key=lambda name: name not in limited)

@@ -2,7 +2,6 @@
 
 import itertools
 import re
-import textwrap
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -293,6 +292,7 @@ def _row(
 _MOST_NAMED = 72
 """Moves up to which each has its name on the axis."""
 _WIDEST = 26
+"""Letters of such a name."""
 _LEAST_SPAN = 0.02
 """Of its largest value: axes of smaller ranges are made to span twice as much."""
 
@@ -354,6 +354,12 @@ def _word(variable: xr.DataArray, value: object, base: object, place: int) -> st
     return f"{last} {', '.join(new) or value}"
 
 
+def _cut(name: str) -> str:
+    """A name without its middle if it is long: moves of one input differ at the end."""
+    half = (_WIDEST - 3) // 2
+    return name if len(name) <= _WIDEST else f"{name[:half]}...{name[-half:]}"
+
+
 @picture("campaign", 20, "Main numbers after each single change", applies=is_one_by_one)
 def one_by_one(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a mark a move in the order of the design; the line is the base case.
@@ -392,7 +398,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
         title = unit_behind(str(says.get("long_name", name)), str(says.get("units", "1")))
         axes.set_title(title, fontsize=9.5)
     places = named(len(samples))
-    names_shown = [textwrap.shorten(words[k], _WIDEST, placeholder=" ...") for k in places]
+    names_shown = [_cut(words[k]) for k in places]
     panels[-1].set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
     panels[-1].set_xlim(-0.7, len(samples) - 0.3)
     legend(figure, [panels[0]], 4)
