@@ -173,6 +173,8 @@ class Winch(Model):
             return time < self.start_time and self.start_time != self.stop_time
         if isinstance(self.winding, PrescribedWinding):
             return time - self.start_time < self.winding.rests_from()
+        if time - self.start_time < max(self.winding.breaks(), default=0.0):
+            return True  # a command that still rises
         return abs(rate) > RESTING * self.winding.usual_speed()
 
 

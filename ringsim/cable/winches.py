@@ -37,6 +37,14 @@ from ringsim.parts.faults import AT_ONCE
 # which P = h ((1 + r) V* + r median(0, g*, 2 V*)) / (1 + 2 r).  With the drum's g in place of g*
 # its gain would count by two thirds.
 #
+# A law that has inertia takes for its acceleration the same differences of its own speed v:
+#
+#     dv/dt = (v - v*) / l,   l = h (1 + r) / (1 + 2 r),
+#     v* = ((1 + r)^2 v_0 - r^2 v_-1) / (1 + 2 r),
+#
+# v_0 and v_-1 the speeds at the beginnings of this step and of the one before; v* stays between 0
+# and 2 v_0, so that no drum that stands is thrown back.  Behind a jump l = h, v* = v_0.
+#
 # A step has the winches that turn behind its begin; where prescribed speeds jump, its end has those
 # before the jump.  So steps must end where a law begins, bends or ends (``Winch.breaks``).
 
@@ -64,6 +72,8 @@ class _Rope:
     members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading, float]]
     """Laws, readings and how fast ``path_slope`` changes (m/rad/s) by cable and end (0 first, 1
     far)."""
+    speeds_at: dict[tuple[int, int], tuple[float, float]]
+    """Speeds of the members at the beginnings of this step and of the one before, m/s."""
     total: float
     """Speed of all members at which they last balanced the rope, m/s."""
     before: tuple[float, float, float] | None = None
@@ -84,6 +94,18 @@ class _Rope:
         ratio = elapsed / last
         past = elapsed * ratio / (1.0 + 2.0 * ratio)
         return elapsed - past, past, wound / last, freed / last
+
+    def lagging(self, place: tuple[int, int], elapsed: float) -> tuple[float, float]:
+        """What the speed of a member is compared with (m/s), and over what time (s), for its
+        acceleration so long after the beginning of the step (s).
+        """
+        now, last = self.speeds_at[place]
+        if self.before is None or elapsed == 0.0:
+            return now, elapsed
+        ratio = elapsed / self.before[0]
+        share = 1.0 + 2.0 * ratio
+        found = ((1.0 + ratio) ** 2 * now - ratio**2 * last) / share
+        return _median(0.0, found, 2.0 * now), elapsed * (1.0 + ratio) / share
 
     def wound(self, elapsed: float, total: float) -> float:
         """Rope that all members have wound since the beginning of the step, m."""
@@ -124,18 +146,14 @@ class _Rope:
         """The answer, by a search from the last one."""
         count, (stiffness, damping_time, width) = len(self.members), self.material
         follow = -self.takeup(elapsed, path, natural, -rate - rest)
-        laws = [
-            (
-                law,
-                replace(
-                    reading,
-                    path_rate=follow / count,
-                    path_slope=reading.path_slope + elapsed * bend,
-                ),
-                law.limits(),
-            )
-            for law, reading, bend in self.members.values()
-        ]
+        laws = []
+        for place, (law, reading, bend) in self.members.items():
+            lagging, lag = self.lagging(place, elapsed)
+            seen = replace(
+                reading, path_rate=follow / count, path_slope=reading.path_slope + elapsed * bend,
+                time=reading.time + elapsed, lagging=lagging, lag=lag,
+            )  # fmt: skip
+            laws.append((law, seen, law.limits()))
 
         def commands(total: float) -> list[float]:
             left = natural - self.wound(elapsed, total)
@@ -215,6 +233,7 @@ class Winches:
             for end, winch in enumerate(cable.winches)
         }
         self._start, self._held = 0.0, np.zeros((len(cables), 2))
+        self._rates = np.zeros_like(self._held)
         self._slopes = np.zeros(len(cables))
         self._turning: dict[tuple[int, int], FeedbackWinding] = {}
         self._ahead: dict[tuple[int, int], float] = {}
@@ -288,7 +307,8 @@ class Winches:
             for place, winch in self._winches.items()
         ]  # fmt: skip
         ropes = [[k, *lengths] for k, lengths in self._begun.items()]
-        return {"winches": rows, "begun": [self._start, self._held, self._slopes, ropes]}
+        begun = [self._start, self._held, self._rates, self._slopes, ropes]
+        return {"winches": rows, "begun": begun}
 
     def go_on(
         self,
@@ -303,7 +323,7 @@ class Winches:
         Rope wound (m) and its rate (m/s) are of shape (cables, 2).  A winch that is another one now
         begins with the rope that is on its drum; its rate is entered.
         """
-        self._start, self._held, self._slopes, ropes = memory["begun"]
+        self._start, self._held, self._rates, self._slopes, ropes = memory["begun"]
         self._begun = {k: (path, natural) for k, path, natural in ropes}
         for number, end, table, ahead, turning in memory["winches"]:
             place = number, end
@@ -350,19 +370,25 @@ class Winches:
         a jump: what turned before no longer counts.
         """
         last, moved, past = time - self._start, state.wound - self._held, self._turning
+        rates = self._rates
         begun, natural = self._begun, state.ropes.content - state.ropes.per_rope(state.wound)
         bends = (slopes - self._slopes) / last if last > 0.0 else 0.0 * slopes
         self._start, self._held, self._slopes, self._ropes = time, state.wound, slopes, {}
+        self._rates = state.wound_rate
         for place, winch in self._winches.items():
             if isinstance(winch.winding, FeedbackWinding) and winch.turns(time + AT_ONCE):
                 k = int(state.ropes.of_end[place])
                 anew = _Rope(
-                    float(state.paths[k]), float(natural[k]), state.material[:, k].tolist(), {}, 0.0
-                )
+                    float(state.paths[k]), float(natural[k]), state.material[:, k].tolist(),
+                    {}, {}, 0.0,
+                )  # fmt: skip
                 reading = state.reading(*place, float(slopes[place[0]]))
+                reading = replace(reading, time=time - winch.start_time)
                 rope = self._ropes.setdefault(k, anew)
                 rope.members[place] = winch.winding, reading, float(bends[place[0]])
-                rope.total += float(state.wound_rate[place])
+                now = float(state.wound_rate[place])
+                rope.speeds_at[place] = now, float(rates[place])
+                rope.total += now
         self._turning = {}
         for k, rope in self._ropes.items():
             laws = {place: law for place, (law, *_) in rope.members.items()}

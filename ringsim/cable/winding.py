@@ -21,6 +21,7 @@ from ringsim.units import (
     PositiveSpeed,
     PositiveTorque,
     Ratio,
+    RotorInertia,
     Second,
     SecondOrZero,
     SignedMetre,
@@ -46,6 +47,13 @@ class WinchReading:
     the structure gives rope free."""
     path_slope: float
     """Derivative of the ideal path length after the measured opening angle, in m/rad."""
+    time: float = math.inf
+    """Since the winch has started, at the end of the step, s."""
+    lagging: float = 0.0
+    """Speed from which the winch has come: at a speed v (m/s) its acceleration is (v - lagging) /
+    lag by backward differences."""
+    lag: float = math.inf
+    """See ``lagging``, s; 0 where no time has passed, so that the speed is what it was."""
 
 
 class Winding(Model):
@@ -142,6 +150,11 @@ bound, and where the line has eleven times the torque at standstill no motor is 
 What pulls harder is braked."""
 
 
+_FOLLOWS = 1e-9
+"""Share of its command below which a rotor lags behind it: its speed is the command's number where
+it follows."""
+
+
 class MotorWinding(FeedbackWinding):
     """A motor with a straight torque-speed line, a gear and a drum.
 
@@ -150,11 +163,11 @@ class MotorWinding(FeedbackWinding):
         m(w) = derating * min(limit, stall_torque * (voltage - w / no_load_speed)),
 
     and a rope of tension T asks for T r / (n e) of it while it is wound, for T r e' / n while it
-    turns the motor back (r the drum's radius, n the gear's ratio, e and e' its efficiencies).  The
-    drum turns at the speed at which both are equal, not above the commanded one; it stands where
-    the motor is too weak to wind and the rope to turn it back, always so if the gear locks itself.
+    turns the motor back (r the drum's radius, n the gear's ratio, e and e' its efficiencies).  What
+    is over accelerates the rotor, J dw/dt = m(w) - load, up to the commanded speed; without
+    ``rotor_inertia`` the motor is in balance with its rope at any time.  The drum stands where the
+    motor is too weak to wind and the rope to turn it back, always so if the gear locks itself.
     Turned back it goes along its line, up to ten times its speed without a load.
-    The inertias of rotor and gear are left out: the motor is in balance with its rope at any time.
 
     >>> motor = MotorWinding(
     ...     no_load_speed=500.0, stall_torque=0.02, gear_ratio=1000.0, efficiency=0.5,
@@ -176,6 +189,12 @@ class MotorWinding(FeedbackWinding):
     speed: MotorSpeed | None = None
     """Commanded speed of the shaft, kept while the motor has the torque for it; left out, the motor
     runs on its voltage alone."""
+    ramp: Second | None = None
+    """Time in which the command rises from standstill to ``speed``, as a quintic step; left out, it
+    is there at once."""
+    rotor_inertia: RotorInertia | None = None
+    """Moment of inertia J about the shaft of all that turns with it: rotor, brake, and gear and
+    drum divided by their ratios squared; left out, none."""
     torque_limit: PositiveTorque | None = None
     """Largest torque that the motor's drive lets the shaft have."""
     current_limit: Ampere | None = None
@@ -197,7 +216,7 @@ class MotorWinding(FeedbackWinding):
     """Of the drum that winds the rope."""
     band: Ratio = 0.05
     """Width of the passage to the limited torque, over that torque: the motor has its full speed
-    below it and stands still at the limit."""
+    below it and stands still at the limit.  A rotor with inertia needs none."""
 
     @model_validator(mode="after")
     def _usable(self) -> "MotorWinding":
@@ -214,6 +233,10 @@ class MotorWinding(FeedbackWinding):
             raise ValueError(
                 f"speed = {self.speed} rad/s must be below voltage * no_load_speed = {fastest:g} "
                 "rad/s: the motor has no torque at its speed (lower it, or raise the voltage)"
+            )
+        if self.ramp is not None and self.speed is None:
+            raise ValueError(
+                f"ramp = {self.ramp} s needs speed, the command that rises: give both, or neither"
             )
         return self
 
@@ -251,6 +274,20 @@ class MotorWinding(FeedbackWinding):
         back = 0.0 if self.torque_constant is None else self.torque_constant
         return current * (self.resistance * current + back * np.asarray(shaft))
 
+    def breaks(self) -> tuple[float, ...]:
+        """The end of the ramp, s."""
+        return () if self.ramp is None else (self.ramp,)
+
+    def commanded(self, time: Any) -> tuple[Any, Any]:
+        """Speed (rad/s) that the shaft shall not exceed so long after the start of its winch (s),
+        and its rate (rad/s^2).
+        """
+        if self.ramp is None:
+            return self.fastest, 0.0
+        phase = np.clip(time / self.ramp, 0.0, 1.0)
+        share = phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
+        return self.fastest * share, self.fastest * 30.0 * (phase * (1.0 - phase)) ** 2 / self.ramp
+
     @property
     def fastest(self) -> float:
         """Highest speed of the shaft, rad/s: the commanded one, or that without a load."""
@@ -279,13 +316,21 @@ class MotorWinding(FeedbackWinding):
         torque = tension * self.travel
         return torque * (self.back_efficiency or 0.0), torque / self.efficiency
 
-    def torque(self, tension: Any, speed: Any) -> Any:
-        """Torque of the motor while it winds at a speed (m/s) against a tension (N), N m.
+    def torque(self, tension: Any, speed: Any, time: Any = math.inf) -> Any:
+        """Torque of the motor while it winds at a speed (m/s) against a tension (N), so long after
+        its winch has started (s), N m.
 
         What the motor does not need it does not give; what it gives beyond its load while it stands
-        is held by the gear.  What turns it back with more than its largest torque meets a brake.
+        is held by the gear.  What turns it back with more than its largest torque meets a brake.  A
+        rotor below its command takes all that is over; on its command what that asks for.
         """
-        return np.clip(self.available(np.asarray(speed) / self.travel), 0.0, self.loads(tension)[1])
+        shaft, load = np.asarray(speed) / self.travel, self.loads(tension)[1]
+        most = self.available(shaft)
+        if self.rotor_inertia is not None:
+            command, rate = self.commanded(time)
+            follows = (shaft >= command * (1.0 - _FOLLOWS)) | (shaft == 0.0)
+            load = np.where(follows, load + self.rotor_inertia * np.asarray(rate), np.inf)
+        return np.clip(most, 0.0, load)
 
     def speed_at(self, tension: float) -> float:
         """Speed of the drum's rope at a tension (N), in m/s; see the class."""
@@ -326,7 +371,22 @@ class MotorWinding(FeedbackWinding):
 
     def command(self, tension: float, reading: WinchReading) -> float:
         """Speed of the motor at a tension (N), in m/s."""
-        return self.speed_at(tension)
+        most = self.travel * float(self.commanded(reading.time)[0])
+        if self.rotor_inertia is None:
+            return min(self.speed_at(tension), most)
+        if reading.lag == 0.0:
+            return reading.lagging
+        holding, winding = self.loads(tension)
+        forward, back = (self._accelerated(load, reading) for load in (winding, holding))
+        return min(self.travel * (forward if forward > 0.0 else min(back, 0.0)), most)
+
+    def _accelerated(self, load: float, reading: WinchReading) -> float:
+        """Speed of the shaft (rad/s) at the end of a step at which J dw/dt = m(w) - load (N m)."""
+        # The torque is the smaller of limit and line, both fall with w: so is the speed of both.
+        by, before = (self.rotor_inertia or 0.0) / reading.lag, reading.lagging / self.travel
+        torque = self.derating * self.stall_torque
+        line = (torque * self.voltage - load + by * before) / (torque / self.no_load_speed + by)
+        return min(line, before + (self.derating * self.limit - load) / by)
 
     def limits(self) -> tuple[float, float]:
         """Standstill, or the most that a rope turns it back, to full speed."""
@@ -338,6 +398,7 @@ class MotorWinding(FeedbackWinding):
 
 
 _RATE = {"cubic": (0.0, 0.0, 3.0, -2.0), "quintic": (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)}
+
 
 
 class RampWinding(PrescribedWinding):

@@ -102,7 +102,7 @@ class Motors(Output):
             runs = np.array([winch.turns(time + AT_ONCE) for time in times], dtype=bool)
             if winch.after_lock == "stop":
                 runs &= times <= np.nan_to_num(held[plane].max(), nan=math.inf)
-            on, given = runs[steps], motor.torque(tension, speed)
+            on, given = runs[steps], motor.torque(tension, speed, times - winch.start_time)
             found[:, :, plane, end] = np.nan_to_num(found[:, :, plane, end])
             place, before = (steps, plane, end), np.maximum(steps - 1, 0)
             torque[place] = np.where(on, given[steps], 0.0)

@@ -12,7 +12,7 @@ from loops import for_each
 from pydantic import ValidationError
 from scipy.integrate import quad, solve_ivp
 
-from cable_cases import LAWS, cable, random_case, still
+from cable_cases import LAWS, cable, random_case, still, wind
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winches import Winches
 from ringsim.cable.winding import (
@@ -170,27 +170,6 @@ def test_far_winch_needs_two_ends():
     assert cable(end="both", far_winch=winch).winches[1] == winch
     assert cable(end="both").winches[1] == cable().winch
     assert len(cable().winches) == 1
-
-
-def wind(law, stiffness, step, steps, path_speed=lambda time: 0.0, friction=LAWS["bearing"]):
-    """Wind a rope over two pulleys whose far end moves: tensions, speeds, last span's strain."""
-    start = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 1, 0]], dtype=float)
-    case = still(
-        start, 0.0, axial_stiffness=stiffness, friction=friction, initial_slack=0.005,
-        winch=Winch(winding=law),
-    )  # fmt: skip
-    winches, tensions, speeds = Winches(case.chain.cables), [], []
-    for k in range(steps):
-        rate = path_speed(k * step)
-        path = np.array([2.0 + case.points[3, 0] - 1.0])
-        case.velocities[3, 0] = rate
-        case.wound, case.wound_rate = winches.at(k * step, case.ropes, path, np.array([rate]))
-        now = case.state()
-        winches.advance(k * step, now, np.zeros(1))
-        tensions.append(now.winch_tensions[0, 0])
-        speeds.append(case.wound_rate[0, 0])
-        case.points[3, 0] += step * rate
-    return np.array(tensions), np.array(speeds), now.tensions[2] / stiffness
 
 
 @pytest.mark.parametrize("stiffness", STIFFNESSES)

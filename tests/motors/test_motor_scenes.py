@@ -161,6 +161,36 @@ def test_a_motor_winds_as_commanded_and_gives_nothing_while_it_is_off() -> None:
     assert np.ptp(found.motor_energy.sel(time=slice(0.45, None)).values) == 0.0
 
 
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_rotors_keep_what_the_rope_does_not_get(fidelity: str) -> None:
+    """Energy of the shafts = work of the winches over the gear's efficiency + J w^2 / 2."""
+    inertia = 1e-6
+    rotor = MOTOR | {"speed": 300.0, "ramp": 0.5, "rotor_inertia": inertia}
+    values = {f"cables.{plane}.winch.winding": rotor for plane in ("upper", "lower")}
+    scene = ring(structure__sections=3, solver__end_time=0.45, solver__tolerance=1e-3)
+    found = simulate(scene.with_values(values), fidelity)
+    last = found.isel(winch=0, time=-1)
+    kept = 0.5 * inertia * float((last.motor_speed**2).sum())
+    given, work = float(last.motor_energy.sum()), float(found.work[-1])
+    assert kept > 0.2 * given
+    assert given == pytest.approx(work / 0.6 + kept, rel=2e-3)
+
+
+def test_a_ramp_takes_the_jump_from_the_first_steps() -> None:
+    peaks = {}
+    for ramp in (None, 0.5):
+        rotor = MOTOR | {"speed": 300.0, "rotor_inertia": 1e-7} | ({"ramp": ramp} if ramp else {})
+        values = {f"cables.{plane}.winch.winding": rotor for plane in ("upper", "lower")}
+        brief = ring(
+            structure__sections=3, solver__end_time=0.05, solver__step=0.02, record__interval=0.05
+        )
+        for tolerance in (3e-3, 1e-4):
+            scene = brief.with_values(values | {"solver.tolerance": tolerance})
+            peaks[ramp, tolerance] = float(simulate(scene, "frame").peak_tension)
+    assert peaks[0.5, 3e-3] < 0.1 * peaks[None, 3e-3]
+    assert peaks[0.5, 3e-3] == pytest.approx(peaks[0.5, 1e-4], rel=5e-3)
+
+
 def test_winches_without_a_motor_have_no_such_output() -> None:
     winding = {"kind": "stall", "speed": 0.05, "max_tension": 5.0}
     brief = ring(structure__sections=3, solver__end_time=0.1, record__interval=0.1)
