@@ -144,8 +144,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
             choices = " or ".join(map(show, _kinds(field)))
             return f"{where}.kind is missing: say which kind it is with kind = {choices}"
         case "missing" if tables:
-            keys = [name for name, each in tables[0].model_fields.items() if each.is_required()]
-            one_of = f" with {' and '.join(keys)}" * bool(keys)
+            required = [name for name, each in tables[0].model_fields.items() if each.is_required()]
+            one_of = f" with {' and '.join(required)}" * bool(required)
             one_of = f" with its kind, one of {', '.join(kinds)}" if kinds else one_of
             return f"{where} is missing: give it a table{one_of}"
         case "model_type" | "model_attributes_type" if kinds:

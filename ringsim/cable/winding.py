@@ -400,7 +400,6 @@ class MotorWinding(FeedbackWinding):
 _RATE = {"cubic": (0.0, 0.0, 3.0, -2.0), "quintic": (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)}
 
 
-
 class RampWinding(PrescribedWinding):
     """Speed rising as a smooth step p(s), s = t / duration, and constant from then on.
 
