@@ -158,10 +158,15 @@ def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
         raise InputError(f"--over {text}: {error}") from None
 
 
-def _sweep(scene: Scene, path: str, low: float, high: float, points: int) -> Sweep:
+def _sweep(
+    scene: Scene, path: str, low: float, high: float, points: int, ratio: float = _DECADE
+) -> Sweep:
+    """An axis; its values are equally far apart in their logarithm from a ``ratio`` of both ends
+    on.
+    """
     paths = _expanded(scene, path)
     least, most = sorted((abs(low), abs(high)))
-    spaced = np.geomspace if low * high > 0.0 and most >= _DECADE * least else np.linspace
+    spaced = np.geomspace if low * high > 0.0 and most >= ratio * least else np.linspace
     values = spaced(low, high, points)
     values[1:-1] = [float(f"{value:.6g}") for value in values[1:-1]]
     if type(_own_value(scene, paths[0])) is int:
@@ -200,8 +205,9 @@ def _around(scene: Scene, alternatives: Sequence[str], points: int) -> Sweep | N
             own = _own_value(scene, _expanded(scene, path)[0])
             if isinstance(own, float) and own != 0.0:  # loads that fold are negative
                 factor = (_STEP_FACTOR if path == "solver.step" else _FACTOR) ** spread
-                low, high = sorted(float(f"{end:.3g}") for end in (own / factor, own * factor))
-                return _sweep(scene, path, low, high, points)
+                # Digits enough that the scene's own value is the one in the middle.
+                low, high = sorted(float(f"{end:.6g}") for end in (own / factor, own * factor))
+                return _sweep(scene, path, low, high, points, ratio=1.0)
         except InputError:
             continue
     return None
