@@ -37,6 +37,7 @@ def ring(**values: object) -> Scene:
         "net": "none",
         "loads.force": 0.03,
         "solver.end_time": 5.0,
+        "solver.settling_time": 0.0,
     }
     return load_scene("ring18").with_values(plain | values)
 

@@ -40,7 +40,7 @@ def found() -> dict[str, Any]:
     values: dict[str, Any] = {
         "structure.opening_angle": 60.0,
         "record.interval": 0.05,
-        "solver.end_time": 2.0,
+        "solver.end_time": 1.4,
     }
     for cable in ("upper", "lower"):
         winding = {"kind": "pulsating", "speed": SPEED, "period": PERIOD}

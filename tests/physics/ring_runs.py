@@ -19,6 +19,8 @@ from ringsim.scene import Scene, load_scene
 from ringsim.stepping.locks import lock_times
 
 Array = NDArray[np.float64]
+UNTIL_LOCKED: dict[str, Any] = {"solver__settling_time": 0.0}
+"""For what is read up to the last lock: what comes after it takes as many steps again."""
 
 
 def ring(sections: int = 6, **values: Any) -> Scene:

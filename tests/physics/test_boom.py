@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ring_runs import Array, ring, run
+from ring_runs import UNTIL_LOCKED, Array, ring, run
 from ringsim.exudyn.assembly import axes_of, turn_rates
 from ringsim.exudyn.build import Built, build
 from ringsim.exudyn.integrate import Integration
@@ -32,7 +32,11 @@ from ringsim.scene import Scene, load_scene
 def test_a_flexible_boom_hardly_bends(base: str, start: float) -> None:
     """A tube of 60 mm against rods of 10 mm: its bending is a hundredth of the rods'."""
     rigid, flexible = (
-        run(ring(3, boom__kind=kind, boom__base=base, structure__opening_angle=start))
+        run(
+            ring(
+                3, boom__kind=kind, boom__base=base, structure__opening_angle=start, **UNTIL_LOCKED
+            )
+        )
         for kind in ("rigid", "flexible")
     )
     assert flexible.reaches(175.0) == pytest.approx(rigid.reaches(175.0), rel=3e-5)
