@@ -181,6 +181,37 @@ def test_a_compiler_is_asked_for_only_where_there_is_none(monkeypatch: pytest.Mo
     assert os.environ["CC"].endswith("-m ziglang cc -mcpu=baseline")
 
 
+@pytest.mark.slow  # a compiler of 80 MB is fetched, and the core compiled twice
+def test_a_machine_without_a_compiler_builds_a_core_of_the_same_bits(tmp_path: Path) -> None:
+    """In a copy, so that nothing compiled lies there."""
+    root = Path(building.__file__).parent
+    listed = subprocess.run(
+        ["git", "-C", str(root), "ls-files", "-z"], capture_output=True, text=True, check=True
+    )
+    for name in filter(None, listed.stdout.split("\0")):
+        (tmp_path / "source" / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(root / name, tmp_path / "source" / name)
+    pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps"]
+    none_there = os.environ | {"CC": "no-such-compiler"}
+    installed = tmp_path / "installed"
+    subprocess.run(
+        [*pip, "--target", str(installed), str(tmp_path / "source")], env=none_there, check=True
+    )
+    told = "import ringsim; d = ringsim.simulate(ringsim.load_scene('truss2'), fidelity='frame'); "
+    told += "print(ringsim.__file__, float(d.deployment_time).hex(), float(d.peak_tension).hex())"
+
+    def run(**path: str) -> list[str]:
+        done = subprocess.run(
+            [sys.executable, "-c", told], env=os.environ | path, cwd=tmp_path, check=True,
+            capture_output=True, text=True,
+        )  # fmt: skip
+        return done.stdout.split()
+
+    own, (file, *found) = run(), run(PYTHONPATH=str(installed))
+    assert file.startswith(str(installed))
+    assert found == own[1:]
+
+
 @pytest.mark.quick
 def test_a_number_that_is_none_stays_none_in_laws() -> None:
     """As numpy has it: what is lost in a law must not look like a value."""
