@@ -256,7 +256,7 @@ def separating(analysis: xr.Dataset, samples: int) -> Iterator[tuple[str, list[i
     """
     if "group" not in analysis.dims:
         return
-    normal = float(scipy.stats.norm.isf(chance_of_each(analysis.sizes["input"]) / 2))
+    normal = -float(scipy.special.ndtri(chance_of_each(analysis.sizes["input"]) / 2))
     places, names = places_in(analysis), analysis["input"].values.astype(str)
     for group in analysis["group"].values:
         one = analysis.sel(group=group)
