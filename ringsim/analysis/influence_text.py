@@ -231,12 +231,11 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
         return
     outputs: dict[tuple[int, int, float], list[str]] = {}
     blocks = ", with the rest of their blocks," if "factor" in analysis.dims else ""
-    for output in analysis["output"].values.tolist():
-        one = analysis.sel(output=output)
-        if count := one["missing"].item():
-            chance = round(one["missing_by_inputs"].item(), 4)
-            failed = one["missing_lost"].item()
-            outputs.setdefault((count, failed, chance), []).append(output)
+    names = ("output", "missing", "missing_lost", "missing_by_inputs")
+    columns = (analysis[name].values.tolist() for name in names)
+    for output, count, failed, chance in zip(*columns, strict=True):
+        if count:
+            outputs.setdefault((count, failed, round(chance, 4)), []).append(output)
     for (count, failed, chance), names in outputs.items():
         who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
         p = chance_text(chance)
@@ -280,7 +279,8 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
         cure = "no intervals: set design.replicates = 8 or more (independent replicates)"
         return [cure] * bool(none) + _unsure(analysis)
     if "given_data_index" in analysis:
-        words = any(is_word(str(name), places_in(analysis)) for name in analysis["input"].values)
+        within = places_in(analysis)
+        words = any(is_word(str(name), within) for name in analysis["input"].values)
         told = "; each word of an input counts by itself, so that these may add up to more than 1"
         return [
             "first-order index: share of the variance that one input alone explains, estimated "
@@ -435,8 +435,10 @@ def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[str
     """
     (dim,) = analysis[measure].dims[1:]
     names = analysis[dim].values.astype(str)
+    of_measure = [measure, _CHANCE.get(measure, measure), f"{measure}_interval"]
+    known = analysis[[name for name in of_measure if name in analysis]]
     for output in analysis["output"].values.tolist():
-        one = analysis.sel(output=output)
+        one = known.sel(output=output)
         values = one[measure].values
         least = _index_ends(one, measure)[:, 0]
         chance = one[_CHANCE[measure]].values if measure in _CHANCE else 0.0 * values
