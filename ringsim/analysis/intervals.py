@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -174,6 +174,7 @@ def _limit(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
     return deviation * np.exp(-log), deviation * np.exp(log)
 
 
+@cache
 def ranks(count: int, probability: float) -> tuple[int, int] | None:
     """Ranks, from 1, between which a quantile lies with at least LEVEL; None if there are none.
 
@@ -312,24 +313,20 @@ def of_difference(
 
 
 def share_interval(count: int, samples: int) -> Interval:
-    """Two-sided exact interval of a share.  Source: Clopper and Pearson, Biometrika 26 (1934)."""
-    low, high = scipy.stats.binomtest(count, samples).proportion_ci(LEVEL, method="exact")
-    return float(low), float(high)
+    """Two-sided exact interval of a share."""
+    return share_bounds(count, samples, 0.5 + LEVEL / 2)
 
 
-def share_bounds(count: int, samples: int, confidence: float) -> Interval:
-    """The lower and the upper one-sided bound of a share, each with the confidence by itself."""
-    low = (
-        scipy.stats.binomtest(count, samples, alternative="greater")
-        .proportion_ci(confidence, "exact")
-        .low
-    )
-    high = (
-        scipy.stats.binomtest(count, samples, alternative="less")
-        .proportion_ci(confidence, "exact")
-        .high
-    )
-    return float(low), float(high)
+def share_bounds(count: float, samples: float, confidence: float) -> Interval:
+    """The lower and the upper one-sided bound of a share, each with the confidence by itself;
+    effective numbers of samples are not whole ones.
+
+    Source: Clopper and Pearson, Biometrika 26 (1934).
+    """
+    inverse, others = scipy.special.betaincinv, samples - count
+    least = float(inverse(count, others + 1, 1 - confidence)) if count > 0 else 0.0
+    most = float(inverse(count + 1, others, confidence)) if others > 0 else 1.0
+    return least, most
 
 
 def samples_needed(violations: int, probability: float, confidence: float) -> int:
@@ -341,8 +338,8 @@ def samples_needed(violations: int, probability: float, confidence: float) -> in
     >>> samples_needed(0, 0.99, 0.9), samples_needed(0, 0.99865, 0.9)
     (230, 1705)
     """
-    others = scipy.stats.nbinom.isf(1.0 - confidence, violations + 1, 1.0 - probability)
-    return violations + 1 + int(others)
+    others = scipy.special.nbdtrik(confidence, violations + 1, 1.0 - probability)
+    return violations + 1 + int(np.ceil(others - 1e-9))  # but for round-off a whole number
 
 
 def _score(count: int, samples: int) -> Interval:

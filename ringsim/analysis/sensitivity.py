@@ -189,8 +189,8 @@ def _given(
         told[:, k, 0], left_out = indices.index(each, values, part)
         if certain:
             told[:, k, 1:] = np.stack(indices.interval(told[:, k, 0], left_out), axis=-1)
-    for one, output in zip(told, values, strict=True):
-        chance = np.full((len(bins), 1), indices.chance_level(bins, output))
+    for one, level in zip(told, indices.chance_levels(bins, values), strict=True):
+        chance = np.full((len(bins), 1), level)
         yield {"given_data_index": (("input",), one), "chance_level": (("input",), chance)}
 
 
