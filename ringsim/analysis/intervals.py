@@ -96,22 +96,27 @@ def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array,
     return np.where(alike, known, low), np.where(alike, known, high)
 
 
-@lru_cache(maxsize=2)
-def _resamples(count: int) -> tuple[NDArray[np.int64], Array]:
-    """Places of the samples of all resamples, and how often each sample is in these, over the
-    count; both of shape (RESAMPLES, count), and the same for all outputs of so many samples.
+@lru_cache(maxsize=32)
+def _resamples(count: int) -> NDArray[np.int16]:
+    """Places of the samples of all resamples, shape (RESAMPLES, count), the same for all outputs
+    of so many samples, of which there are LARGE at most.
     """
-    places = np.random.default_rng(0).integers(0, count, (RESAMPLES, count))
-    cells = places + np.arange(RESAMPLES)[:, None] * count
+    return np.random.default_rng(0).integers(0, count, (RESAMPLES, count)).astype(np.int16)
+
+
+@lru_cache(maxsize=2)
+def _times(count: int) -> Array:
+    """How often each sample is in each of these, over the count, shape (RESAMPLES, count)."""
+    cells = _resamples(count) + np.arange(RESAMPLES)[:, None] * count
     times = np.bincount(cells.ravel(), minlength=RESAMPLES * count).reshape(RESAMPLES, count)
-    return places, times / count
+    return times / count
 
 
 def _of_mean(values: Array) -> Array:
     """Interval of the mean of values, shape (n,), by the bootstrap with bias correction and
     acceleration (BCa), Efron (1987); shape (2,).
     """
-    known, means = values.mean(), values[_resamples(len(values))[0]].mean(axis=1)
+    known, means = values.mean(), values[_resamples(len(values))].mean(axis=1)
     below = ((means < known).sum() + (means <= known).sum()) / (2 * RESAMPLES)
     apart, shift = values - known, scipy.special.ndtri(below)
     bend = (apart**3).sum() / (6 * (apart**2).sum() ** 1.5)
@@ -131,7 +136,7 @@ def _of_spread(values: Array) -> tuple[Array, Array]:
     count, known = values.shape[-1], spread(values)
     scaled = (values - values.mean(axis=-1, keepdims=True)) / known[..., None]
     powers = np.stack([scaled**k for k in (1, 2, 3, 4)])
-    one, two, three, four = powers @ _resamples(count)[1].T
+    one, two, three, four = powers @ _times(count).T
     square = (two - one**2) * count / (count - 1)
     fourth = four - 4 * three * one + 6 * two * one**2 - 3 * one**4
     with np.errstate(divide="ignore", invalid="ignore"):
