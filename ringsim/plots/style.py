@@ -499,7 +499,7 @@ def write(figure: Figure, path: Path) -> None:
 
 HEAVY = 120_000
 """Bytes of SVG above which a figure goes into a page as PNG."""
-_ARTISTS = 1500
+_ARTISTS = 800
 """Artists of a figure whose SVG is beyond that: 400 to 600 took 100 to 170 thousand."""
 _DPI = 110
 _PIXELS = 96.0

@@ -51,6 +51,10 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     rows = blocks * len(planes)
     figure = Figure(figsize=(max(1.75 * columns, 7.0), max(1.3 * rows, 2.4) + 2.0))
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    drawn = [each for each in (found, one) if each is not None]
+    # First of all: each curve would ask all panels, which share them, for limits of their own.
+    grid[0, 0].set_ylim(*_limits(drawn))
+    grid[0, 0].set_xlim(0.0, float(found["time"][-1]) or 1.0)
     axes: Axes
     for place, axes in enumerate(grid.ravel()):
         row, column = divmod(place, columns)
@@ -74,9 +78,6 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
         if plane == planes[-1] and number + columns >= len(sections):
             axes.tick_params(labelbottom=True)
             axes.set_xlabel(style.label(found["time"], width=24), fontsize=8)
-    drawn = [each for each in (found, one) if each is not None]
-    grid[0, 0].set_ylim(*_limits(drawn))
-    grid[0, 0].set_xlim(0.0, float(found["time"][-1]) or 1.0)
     grid[0, 0].xaxis.set_major_locator(MaxNLocator(3))
     figure.supylabel(style.label(found, width=26), fontsize=10)
     words = [
