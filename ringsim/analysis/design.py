@@ -440,12 +440,13 @@ def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) 
     >>> strongest(["5 to 8", "mean", "1"], places)
     ['5 to 8', '1']
     """
-    kept = list[str]()
+    kept, taken = list[str](), dict[str, list[tuple[int, int]]]()
     for name in names:
         own, low, high = places.get(name, (name, 0, 0))
-        others = (places.get(each, (each, 0, 0)) for each in kept)
-        if not any(own == its and max(low, first) < min(high, end) for its, first, end in others):
+        others = taken.setdefault(own, [])
+        if not any(max(low, first) < min(high, end) for first, end in others):
             kept.append(name)
+            others.append((low, high))
     return kept
 
 

@@ -47,8 +47,8 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
     for output in _correlated(analysis):
         plain, partial = (
             (
-                analysis[f"{output}_{word}rank_correlation"].values,
-                analysis[f"{output}_{word}rank_correlation_interval"].values,
+                analysis.variables[f"{output}_{word}rank_correlation"].values,
+                analysis.variables[f"{output}_{word}rank_correlation_interval"].values,
             )
             for word in ("", "partial_")
         )
@@ -203,18 +203,20 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
     head = ["what explains"]
     for name in names:
         head += [HEADS[name]] + ["95 % interval"] * (f"{name}_interval" in analysis)
-    rows, named = [], set[str]()
+    rows, named, every = [], set[str](), analysis[dim].values
+    wanted = [*names, *(f"{name}_interval" for name in names), "index_used", "index_lost"]
+    known = analysis[[name for name in wanted if name in analysis]]
     for output in analysis["output"].values.tolist():
-        one = analysis.sel(output=output)
+        one = known.sel(output=output)
         size = np.nan_to_num(one[names[0]].values, nan=-np.inf)
         order = np.argsort(-size, kind="stable")
-        kept = strongest(analysis[dim].values[order].tolist(), within)
-        order = order[np.isin(analysis[dim].values[order], kept)]
+        kept = strongest(every[order].tolist(), within)
+        order = order[np.isin(every[order], kept)]
         chosen = [k for k in order[~place[order]][:_MOST] if np.isfinite(size[k])]
         chosen += [k for k in order[place[order]][:_MOST_PLACES] if np.isfinite(size[k])]
-        named |= {str(analysis[dim].values[k]) for k in chosen}
+        named |= {str(every[k]) for k in chosen}
         for k in chosen:
-            row = [f"{output} by {analysis[dim].values[k]}"]
+            row = [f"{output} by {every[k]}"]
             for name in names:
                 row.append(number_text(one[name].values[k], 2))
                 if f"{name}_interval" in one:

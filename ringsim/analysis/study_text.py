@@ -439,8 +439,8 @@ def every_statistic(analysis: xr.Dataset) -> Table:
             if np.isnan(value) or (same and statistic != "maximum"):
                 continue
             digits = 4 if statistic == "standard_deviation" else fine
-            first = factor * analysis[f"{name}_convergence"].values[:-1, k]
-            low, high = (factor * analysis[f"{name}_interval"].values[k]).tolist()
+            first = factor * analysis.variables[f"{name}_convergence"].values[:-1, k]
+            low, high = (factor * analysis.variables[f"{name}_interval"].values[k]).tolist()
             side, who = k - len(STATISTICS) + 2, ("-", "-")
             if side >= 0 and not same:
                 bar = factor * analysis[f"{name}_end_error"].values[side]
@@ -473,7 +473,7 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         if is_moment(name) and not wanted:
             continue
         errors, counts, largest, samples = (
-            analysis[f"{name}_{word}"].values
+            analysis.variables[f"{name}_{word}"].values
             for word in ("error_of_mean", "error_samples", "largest_error", "largest_error_sample")
         )
         mean, *_, least, most = analysis[name].values
