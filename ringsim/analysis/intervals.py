@@ -96,12 +96,12 @@ def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array,
     return np.where(alike, known, low), np.where(alike, known, high)
 
 
-@lru_cache(maxsize=32)
-def _resamples(count: int) -> NDArray[np.int16]:
+@lru_cache(maxsize=16)
+def _resamples(count: int) -> NDArray[np.int64]:
     """Places of the samples of all resamples, shape (RESAMPLES, count), the same for all outputs
     of so many samples, of which there are LARGE at most.
     """
-    return np.random.default_rng(0).integers(0, count, (RESAMPLES, count)).astype(np.int16)
+    return np.random.default_rng(0).integers(0, count, (RESAMPLES, count))
 
 
 @lru_cache(maxsize=2)
