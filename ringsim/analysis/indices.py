@@ -358,7 +358,8 @@ def chance_levels(columns: Sequence[Bins], outputs: Array) -> Array:
     random, count = np.random.default_rng(0), int(np.clip(_NUMBERS // samples, 39, _SHUFFLES))
     shuffles = np.stack([random.permutation(samples) for _ in range(count)], axis=1)
     left = np.flatnonzero(varied & ~normal)
-    for some in np.split(left, range(_AT_ONCE, len(left), _AT_ONCE)):
+    for first in range(0, len(left), _AT_ONCE):
+        some = left[first : first + _AT_ONCE]
         scaled = scatter[some] / np.sqrt(square[some, None])
         shuffled = np.hstack([each[shuffles] for each in scaled])
         largest = np.fmax.reduce([given_data_indices(bins, shuffled) for bins in columns])

@@ -233,8 +233,8 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
         return
     outputs: dict[tuple[int, int, float], list[str]] = {}
     blocks = ", with the rest of their blocks," if "factor" in analysis.dims else ""
-    names = ("output", "missing", "missing_lost", "missing_by_inputs")
-    columns = (analysis[name].values.tolist() for name in names)
+    needed = ("output", "missing", "missing_lost", "missing_by_inputs")
+    columns = (analysis[name].values.tolist() for name in needed)
     for output, count, failed, chance in zip(*columns, strict=True):
         if count:
             outputs.setdefault((count, failed, round(chance, 4)), []).append(output)

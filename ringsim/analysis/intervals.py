@@ -121,7 +121,8 @@ def _of_mean(values: Array) -> Array:
     apart, shift = values - known, scipy.special.ndtri(below)
     bend = (apart**3).sum() / (6 * (apart**2).sum() ** 1.5)
     far = shift + scipy.special.ndtri([(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return np.quantile(means, scipy.special.ndtr(shift + far / (1 - bend * far)))
+    levels = scipy.special.ndtr(shift + far / (1 - bend * far))
+    return np.asarray(np.quantile(means, levels))
 
 
 def _of_spread(values: Array) -> tuple[Array, Array]:

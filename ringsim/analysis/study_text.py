@@ -269,7 +269,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
     rows, notes = [], [_DECIDES] * bool(analysis.sizes.get("requirement"))
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         variables = analysis.sel(requirement=name).variables
-        one = {str(n): v.item() for n, v in variables.items() if not v.dims}
+        one = {str(n): v.values.item() for n, v in variables.items() if not v.dims}
         verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
         further = one["further_samples"]
         rows.append((

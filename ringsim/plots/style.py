@@ -539,7 +539,8 @@ class Inline:
         with matplotlib.rc_context({"svg.hashsalt": name}):
             # By the canvas itself: savefig draws a figure twice that had a layout to find.
             self._placed.set_dpi(matplotlib.rcParams["savefig.dpi"])
-            FigureCanvasSVG(self._placed).print_svg(held, metadata={"Date": None})
+            canvas: Any = FigureCanvasSVG(self._placed)
+            canvas.print_svg(held, metadata={"Date": None})
         text = held.getvalue()
         text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
         text = re.sub(r'\bid="', f'id="{name}-', text)
@@ -554,7 +555,7 @@ class Inline:
     @styled
     def _picture(self) -> str:
         self._placed.set_dpi(_DPI)
-        canvas = FigureCanvasAgg(self._placed)
+        canvas: Any = FigureCanvasAgg(self._placed)
         canvas.draw()
         drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         # 256 colours are a third of the bytes, and nobody sees a difference.
