@@ -158,8 +158,8 @@ class Ring:
         own = self._dataset
         analysis = own if "statistic" in own.dims else analyse(own)
         found = {}
-        for each in sections(analysis, self._folder()).values():
-            for table in each.more if full and each.more else each.tables:
+        for each in sections(analysis, self._folder(), full=full).values():
+            for table in each.more or each.tables:
                 if table.rows:
                     rows = pd.DataFrame(table.rows, columns=table.head)
                     rows.attrs["notes"] = list(table.notes)

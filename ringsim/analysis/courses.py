@@ -159,9 +159,10 @@ def _laid(angles: Array, time: Array, known: Mask, at: Places) -> Array:
     before, after = (
         np.where(before < 0, after, before), np.where(after == len(place), before, after),
     )  # fmt: skip
-    apart = np.where(after > before, time[after] - time[before], 1.0)
-    weight = ((time[at] - time[before]) / apart * (after > before))[:, None, None]
-    first, second = (
-        np.take_along_axis(angles, each[:, None, None], axis=-1) for each in (before, after)
-    )
-    return np.asarray(first + weight * (second - first))
+    found = np.take_along_axis(angles, before[:, None, None], axis=-1)
+    rows, columns = np.nonzero(after > before)
+    before, after = before[rows, columns], after[rows, columns]
+    weight = (time[at[columns]] - time[before]) / (time[after] - time[before])
+    first, second = angles[rows, :, :, before], angles[rows, :, :, after]
+    found[rows, :, :, columns] = first + weight[:, None, None] * (second - first)
+    return found

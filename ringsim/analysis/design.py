@@ -269,17 +269,15 @@ def scalars(campaign: xr.Dataset) -> list[str]:
     """Main numbers of the antenna that some sample has, in the order of summaries; none that is
     round-off in all samples.
     """
-    sound = used(campaign)
-    return [
-        name
-        for name, variable in VARIABLES.items()
-        if variable.summary is not None
-        and variable.dtype == "f8"
-        and name not in (*NUMERICAL, *_EFFORT)
-        and name in sound
-        and bool(np.isfinite(sound[name]).any())
-        and not bool(np.abs(sound[name]).max() < NOTHING)
-    ]
+    ok, found = good(campaign), list[str]()
+    for name, variable in VARIABLES.items():
+        if variable.summary is None or variable.dtype != "f8" or name not in campaign:
+            continue
+        values = np.abs(numbers(campaign, name)[ok])
+        known = np.isfinite(values).any() and not values[~np.isnan(values)].max() < NOTHING
+        if known and name not in (*NUMERICAL, *_EFFORT):
+            found.append(name)
+    return found
 
 
 def values_of(campaign: xr.Dataset, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -440,12 +438,13 @@ def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) 
     >>> strongest(["5 to 8", "mean", "1"], places)
     ['5 to 8', '1']
     """
-    kept = list[str]()
+    kept, taken = list[str](), dict[str, list[tuple[int, int]]]()
     for name in names:
         own, low, high = places.get(name, (name, 0, 0))
-        others = (places.get(each, (each, 0, 0)) for each in kept)
-        if not any(own == its and max(low, first) < min(high, end) for its, first, end in others):
+        others = taken.setdefault(own, [])
+        if not any(max(low, first) < min(high, end) for first, end in others):
             kept.append(name)
+            others.append((low, high))
     return kept
 
 
@@ -484,7 +483,8 @@ def blocks(campaign: xr.Dataset, names: Sequence[str]) -> Iterator[xr.Dataset]:
 
 def any_finite(campaign: xr.Dataset, name: str) -> bool:
     """Whether a variable has a number in a sample whose numbers hold."""
-    return any(
+    first = np.flatnonzero(good(campaign))[:1]  # nearly always tells it, without a block
+    return bool(np.isfinite(campaign[name].isel(sample=first).to_numpy()).any()) or any(
         bool(np.isfinite(block[name].to_numpy()[good(block)]).any())
         for block in blocks(campaign, [name, "status"])
     )

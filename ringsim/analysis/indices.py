@@ -28,8 +28,16 @@ def centred_ranks(columns: Array) -> Array:
     """Ranks in every column less their mean; one by one, because all at once take much memory."""
     found = np.empty(columns.shape)
     for k, column in enumerate(columns.T):
-        found[:, k] = scipy.stats.rankdata(column) - (len(column) + 1) / 2
+        _, place, counts = np.unique(column, return_inverse=True, return_counts=True)
+        found[:, k] = _ranks(place, counts) - (len(column) + 1) / 2
     return found
+
+
+def _ranks(place: NDArray[np.int64], counts: NDArray[np.int64]) -> Array:
+    """Ranks from 1, of equal values their mean, from the place of each among the different ones,
+    and how often these are there.
+    """
+    return (np.cumsum(counts) - (counts - 1) / 2)[place]
 
 
 class Columns:
@@ -122,7 +130,7 @@ def largest_by_chance(samples: int, held: Array, among: int) -> Array:
     correction; infinite if too few samples are left.
     """
     free = np.maximum(samples - 2.0 - held, 0.0)
-    beyond = scipy.stats.t.isf(chance_of_each(among) / 2, np.maximum(free, 1.0))
+    beyond = -scipy.special.stdtrit(np.maximum(free, 1.0), chance_of_each(among) / 2)
     return np.asarray(np.where(free > 0, beyond / np.sqrt(free + beyond**2), np.inf))
 
 
@@ -231,12 +239,16 @@ LEAST_SAMPLES = 40
 """Samples below which no index is given."""
 PARTS = 20
 """Parts of independent samples, each of which the jackknife leaves out once."""
+_NO_LINE = 1e-12
+"""Scatter of places in a bin, as a sum of squares, from which on no line is fitted there."""
 _FEW_VALUES = 12
 """Different values of a column up to which each is a bin of its own."""
 _LEVEL = 0.95
 _SHUFFLES = 199
 _NUMBERS = 4_000_000
 """Numbers that all shuffles of an output may take, about."""
+_AT_ONCE = 4
+"""Outputs that are shuffled at once."""
 _MANY = 20_000
 """Samples from which on indices by chance are those of a normal output."""
 
@@ -245,13 +257,13 @@ class Bins:
     """The bins of one column: about n^(1/3) with as many samples each, or one for each value."""
 
     def __init__(self, column: Array) -> None:
-        values, codes = np.unique(column, return_inverse=True)
+        values, codes, counts = np.unique(column, return_inverse=True, return_counts=True)
         count = len(column)
         self.lined = len(values) > _FEW_VALUES
         """Whether a line is fitted in each bin, along the ranks; else a mean."""
         if self.lined:
             bins = max(2, round(count ** (1 / 3)))
-            rank = scipy.stats.rankdata(column) - 0.5
+            rank = _ranks(codes, counts) - 0.5
             self.bin = np.minimum((rank * bins / count).astype(np.int64), bins - 1)
             self.place = rank * bins / count - self.bin - 0.5
         else:
@@ -259,8 +271,9 @@ class Bins:
         self.count = int(self.bin.max()) + 1
 
 
-def index(bins: Bins, output: Array, part: NDArray[np.int64]) -> tuple[float, Array]:
-    """First-order index of a column, and the estimates that leave out each part.
+def index(bins: Bins, output: Array, part: NDArray[np.int64]) -> tuple[Array, Array]:
+    """First-order indices of a column for outputs, shape (..., samples), and the estimates that
+    leave out each part, shape (..., parts).
 
     The share of the output's variance that a line in each bin explains, less what it would explain
     by chance, as in the adjusted coefficient of determination.  What is left is a bias downwards
@@ -269,88 +282,89 @@ def index(bins: Bins, output: Array, part: NDArray[np.int64]) -> tuple[float, Ar
     for binning; Ezekiel, Methods of Correlation Analysis (1930), for the correction.
     """
     parts = int(part.max()) + 1
-    y, x = output - output.mean(), bins.place
-    cell = bins.bin * parts + part
+    y, x = output - output.mean(axis=-1, keepdims=True), bins.place
+    cell, size = bins.bin * parts + part, bins.count * parts
 
-    def summed(weight: Array | None) -> Array:
-        """By bin and by what is left out: nothing, then each part; shape (1 + parts, bins)."""
-        cells = np.bincount(cell, weight, minlength=bins.count * parts).reshape(-1, parts)
-        whole = cells.sum(axis=1, keepdims=True)
-        return np.asarray(np.hstack([whole, whole - cells]).T, dtype=float)
+    def summed(weights: Array) -> Array:
+        """By what is left out (nothing, each part) and by bin, shape (..., 1 + parts, bins)."""
+        rows = weights.reshape(-1, weights.shape[-1])
+        places = cell + size * np.arange(len(rows))[:, None]
+        cells = np.bincount(places.ravel(), rows.ravel(), minlength=size * len(rows))
+        cells = cells.reshape(*weights.shape[:-1], bins.count, parts).swapaxes(-1, -2)
+        whole = cells.sum(axis=-2, keepdims=True)
+        return np.concatenate([whole, whole - cells], axis=-2)
 
-    n, sx, sxx = summed(None), summed(x), summed(x * x)
-    found = _adjusted(bins.lined, (n, sx, sxx), summed(y), summed(x * y), summed(y * y).sum(axis=1))
-    return float(found[0]), found[1:]
-
-
-def _adjusted(
-    lined: bool, columns: tuple[Array, Array, Array], sy: Array, sxy: Array, syy: Array
-) -> Array:
-    """Indices from sums over bins, along the last axis: ``columns`` are those of 1, x and x^2."""
-    n, sx, sxx = columns
+    n, sx, sxx = summed(np.ones(len(x))), summed(x), summed(x * x)
+    sy, sxy, syy = summed(y), summed(x * y), summed(y * y).sum(axis=-1)
     full = np.maximum(n, 1.0)
-    explained = sy**2 / full
-    free = (n > 0).sum(axis=-1) - 1.0
-    if lined:
-        spread = sxx - sx**2 / full
-        sloped = spread > 1e-12
-        along = (sxy - sx * sy / full) ** 2
-        explained = explained + np.where(sloped, along / np.where(sloped, spread, 1.0), 0.0)
-        free = free + sloped.sum(axis=-1)
+    spread = sxx - sx**2 / full  # none where no line is fitted
+    sloped = spread > _NO_LINE
+    along = np.where(sloped, (sxy - sx * sy / full) ** 2 / np.where(sloped, spread, 1.0), 0.0)
+    free = (n > 0).sum(axis=-1) - 1.0 + sloped.sum(axis=-1)
     samples = n.sum(axis=-1)
     total = syy - sy.sum(axis=-1) ** 2 / np.maximum(samples, 1.0)
-    left = syy - explained.sum(axis=-1)
+    left = syy - (sy**2 / full + along).sum(axis=-1)
     known = (total > 0) & (samples - 1 > free)
     spare = np.where(known, samples - 1 - free, 1.0)
     found = 1 - left / np.where(known, total, 1.0) * (samples - 1) / spare
-    return np.asarray(np.where(known, found, np.nan))
+    found = np.where(known, found, np.nan)
+    return found[..., 0], found[..., 1:]
 
 
-def interval(estimate: float, left_out: Array) -> tuple[float, float]:
-    """Interval from the estimates that leave out independent parts, with Student's t.
+def interval(estimate: Array, left_out: Array) -> tuple[Array, Array]:
+    """Intervals, shape (...), from the estimates that leave out independent parts, shape (...,
+    parts), with Student's t.
 
     Delete-a-group jackknife: Kott, Journal of Official Statistics 17 (2001).
     """
-    half = student(len(left_out)) * float(jackknife_error(left_out))
+    half = student(left_out.shape[-1]) * jackknife_error(np.moveaxis(left_out, -1, 0))
     return estimate - half, estimate + half
 
 
-def given_data_indices(bins: Bins, centred: Array) -> Array:
-    """Indices of a column with many outputs less their means, shape (samples, outputs), of which
-    none is missing.
+def given_data_indices(bins: Bins, outputs: Array) -> Array:
+    """Indices of a column with many outputs, shape (samples, outputs), of which none is missing;
+    each less its mean, and the sum of its squares is 1.
     """
-    count, samples = len(centred), np.arange(len(centred))
+    steps = (bins.bin == np.unique(bins.bin)[:, None]).astype(float)
+    number = steps.sum(axis=1, keepdims=True)
+    lines = steps * (bins.place - steps @ bins.place[:, None] / number)
+    spread = (lines**2).sum(axis=1, keepdims=True)
+    sloped = spread[:, 0] > _NO_LINE
+    # Functions whose squares sum up to 1, none of which tells anything of another.
+    terms = np.concatenate([steps / np.sqrt(number), lines[sloped] / np.sqrt(spread[sloped])])
+    spare = len(outputs) - len(terms)
+    if spare < 1:
+        return np.full(outputs.shape[1], np.nan)
+    explained = ((terms @ outputs) ** 2).sum(axis=0)
+    return np.asarray(1 - (1 - explained) * (len(outputs) - 1) / spare)
 
-    def by_bin(weight: Array) -> "scipy.sparse.csr_array":
-        return scipy.sparse.csr_array((weight, (bins.bin, samples)), shape=(bins.count, count))
 
-    one, along = by_bin(np.ones(count)), by_bin(bins.place)
-    sums = one.sum(axis=1), along.sum(axis=1), by_bin(bins.place**2).sum(axis=1)
-    squares = np.einsum("ij,ij->j", centred, centred)
-    return _adjusted(bins.lined, sums, (one @ centred).T, (along @ centred).T, squares)
+def chance_levels(columns: Sequence[Bins], outputs: Array) -> Array:
+    """Of each output the largest index of all columns that chance reaches in one case of 20.
 
-
-def chance_level(columns: Sequence[Bins], output: Array) -> float:
-    """The largest index of all columns that an output of chance reaches in one case of 20.
-
-    From the same shuffles of the output, shape (samples,), for all columns, so that what these have
-    in common counts; NaN if no column has an index.
+    From the same shuffles of the outputs, shape (outputs, samples), for all columns, so that what
+    these have in common counts; NaN if no column has an index.
     Source: Westfall and Young, Resampling-Based Multiple Testing (1993), the largest statistic.
     Of many samples the distribution F tells the same, with Sidak's correction: within 7 % of the
     shuffles where the kurtosis is below a hundredth of the samples.
     """
-    scatter = output - output.mean()
-    if len(output) >= _MANY and (scatter**4).mean() < 0.01 * len(output) * scatter.var() ** 2:
+    samples, found = outputs.shape[1], np.full(len(outputs), np.nan)
+    scatter = outputs - outputs.mean(axis=1, keepdims=True)
+    varied = (square := (scatter**2).sum(axis=1)) > 0
+    normal = (scatter**4).mean(axis=1) < 0.01 * square**2 / samples
+    if (normal := varied & normal & (samples >= _MANY)).any():
         each = chance_of_each(len(columns))
-        return float(np.fmax.reduce([level_of_normal(bins, each) for bins in columns]))
-    random = np.random.default_rng(0)
-    shuffles = int(np.clip(_NUMBERS // len(output), 39, _SHUFFLES))
-    y = output - output.mean()
-    shuffled = np.stack([random.permutation(y) for _ in range(shuffles)], axis=1)
-    largest = np.full(shuffles, np.nan)
-    for bins in columns:
-        largest = np.fmax(largest, given_data_indices(bins, shuffled))
-    return float(np.quantile(largest, _LEVEL))
+        found[normal] = np.fmax.reduce([level_of_normal(bins, each) for bins in columns])
+    random, count = np.random.default_rng(0), int(np.clip(_NUMBERS // samples, 39, _SHUFFLES))
+    shuffles = np.stack([random.permutation(samples) for _ in range(count)], axis=1)
+    left = np.flatnonzero(varied & ~normal)
+    for first in range(0, len(left), _AT_ONCE):
+        some = left[first : first + _AT_ONCE]
+        scaled = scatter[some] / np.sqrt(square[some, None])
+        shuffled = np.hstack([each[shuffles] for each in scaled])
+        largest = np.fmax.reduce([given_data_indices(bins, shuffled) for bins in columns])
+        found[some] = np.quantile(largest.reshape(-1, count), _LEVEL, axis=1)
+    return found
 
 
 def level_of_normal(bins: Bins, chance: float) -> float:
@@ -362,7 +376,7 @@ def level_of_normal(bins: Bins, chance: float) -> float:
     spare = count - 1 - terms
     if spare < 1:
         return np.nan
-    explained = terms * float(scipy.stats.f.isf(chance, terms, spare)) / spare
+    explained = terms * float(scipy.special.fdtri(terms, spare, 1 - chance)) / spare
     return 1 - (count - 1) / spare / (1 + explained)
 
 
@@ -446,7 +460,7 @@ def dependence(missing: Mask, columns: Array, block: NDArray[np.int64] | None = 
                 spread = float(each.std(ddof=1)) * np.sqrt((1 - gone / count) / gone)
                 moved = abs(float(each[missing].mean()))
                 largest = max(largest, moved / spread if spread > 0 else 0.0)
-        chances.append(2 * columns.shape[1] * float(2 * scipy.stats.norm.sf(largest)))
+        chances.append(2 * columns.shape[1] * float(2 * scipy.special.ndtr(-largest)))
     if block is not None:
         chances.append(_clustered(np.bincount(block[missing], minlength=block[-1] + 1), block))
     return min(1.0, len(chances) * min(chances)) if chances else 1.0

@@ -256,7 +256,7 @@ def separating(analysis: xr.Dataset, samples: int) -> Iterator[tuple[str, list[i
     """
     if "group" not in analysis.dims:
         return
-    normal = float(scipy.stats.norm.isf(chance_of_each(analysis.sizes["input"]) / 2))
+    normal = -float(scipy.special.ndtri(chance_of_each(analysis.sizes["input"]) / 2))
     places, names = places_in(analysis), analysis["input"].values.astype(str)
     for group in analysis["group"].values:
         one = analysis.sel(group=group)
@@ -279,7 +279,7 @@ def standing_out(analysis: xr.Dataset, output: str, samples: int) -> tuple[Array
     of what the largest reaches by chance in so many samples; shape (input,) both.
     """
     (values, ends), (plain, plain_ends) = (
-        (analysis[name].values, analysis[f"{name}_interval"].values)
+        (analysis.variables[name].values, analysis.variables[f"{name}_interval"].values)
         for name in (f"{output}_{word}rank_correlation" for word in RANKS)
     )
     partial = np.isfinite(values)
@@ -301,7 +301,8 @@ def places_in(analysis: xr.Dataset) -> dict[str, tuple[str, int, int]]:
     """Of each input whose it is, its first place and the one behind its last."""
     if "input_of" not in analysis:
         return {}
-    columns = (analysis[name].values.tolist() for name in ("input", "input_of", "input_span"))
+    names = ("input", "input_of", "input_span")
+    columns = (analysis.variables[name].values.tolist() for name in names)
     return {name: (own, *span) for name, own, span in zip(*columns, strict=True)}
 
 

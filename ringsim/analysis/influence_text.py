@@ -47,8 +47,8 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
     for output in _correlated(analysis):
         plain, partial = (
             (
-                analysis[f"{output}_{word}rank_correlation"].values,
-                analysis[f"{output}_{word}rank_correlation_interval"].values,
+                analysis.variables[f"{output}_{word}rank_correlation"].values,
+                analysis.variables[f"{output}_{word}rank_correlation_interval"].values,
             )
             for word in ("", "partial_")
         )
@@ -203,18 +203,20 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
     head = ["what explains"]
     for name in names:
         head += [HEADS[name]] + ["95 % interval"] * (f"{name}_interval" in analysis)
-    rows, named = [], set[str]()
+    rows, named, every = [], set[str](), analysis[dim].values
+    wanted = [*names, *(f"{name}_interval" for name in names), "index_used", "index_lost"]
+    known = analysis[[name for name in wanted if name in analysis]]
     for output in analysis["output"].values.tolist():
-        one = analysis.sel(output=output)
+        one = known.sel(output=output)
         size = np.nan_to_num(one[names[0]].values, nan=-np.inf)
         order = np.argsort(-size, kind="stable")
-        kept = strongest(analysis[dim].values[order].tolist(), within)
-        order = order[np.isin(analysis[dim].values[order], kept)]
+        kept = strongest(every[order].tolist(), within)
+        order = order[np.isin(every[order], kept)]
         chosen = [k for k in order[~place[order]][:_MOST] if np.isfinite(size[k])]
         chosen += [k for k in order[place[order]][:_MOST_PLACES] if np.isfinite(size[k])]
-        named |= {str(analysis[dim].values[k]) for k in chosen}
+        named |= {str(every[k]) for k in chosen}
         for k in chosen:
-            row = [f"{output} by {analysis[dim].values[k]}"]
+            row = [f"{output} by {every[k]}"]
             for name in names:
                 row.append(number_text(one[name].values[k], 2))
                 if f"{name}_interval" in one:
@@ -231,12 +233,11 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
         return
     outputs: dict[tuple[int, int, float], list[str]] = {}
     blocks = ", with the rest of their blocks," if "factor" in analysis.dims else ""
-    for output in analysis["output"].values.tolist():
-        one = analysis.sel(output=output)
-        if count := one["missing"].item():
-            chance = round(one["missing_by_inputs"].item(), 4)
-            failed = one["missing_lost"].item()
-            outputs.setdefault((count, failed, chance), []).append(output)
+    needed = ("output", "missing", "missing_lost", "missing_by_inputs")
+    columns = (analysis[name].values.tolist() for name in needed)
+    for output, count, failed, chance in zip(*columns, strict=True):
+        if count:
+            outputs.setdefault((count, failed, round(chance, 4)), []).append(output)
     for (count, failed, chance), names in outputs.items():
         who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
         p = chance_text(chance)
@@ -280,7 +281,8 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
         cure = "no intervals: set design.replicates = 8 or more (independent replicates)"
         return [cure] * bool(none) + _unsure(analysis)
     if "given_data_index" in analysis:
-        words = any(is_word(str(name), places_in(analysis)) for name in analysis["input"].values)
+        within = places_in(analysis)
+        words = any(is_word(str(name), within) for name in analysis["input"].values)
         told = "; each word of an input counts by itself, so that these may add up to more than 1"
         return [
             "first-order index: share of the variance that one input alone explains, estimated "
@@ -435,8 +437,10 @@ def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[str
     """
     (dim,) = analysis[measure].dims[1:]
     names = analysis[dim].values.astype(str)
+    of_measure = [measure, _CHANCE.get(measure, measure), f"{measure}_interval"]
+    known = analysis[[name for name in of_measure if name in analysis]]
     for output in analysis["output"].values.tolist():
-        one = analysis.sel(output=output)
+        one = known.sel(output=output)
         values = one[measure].values
         least = _index_ends(one, measure)[:, 0]
         chance = one[_CHANCE[measure]].values if measure in _CHANCE else 0.0 * values

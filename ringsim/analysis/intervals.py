@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +31,7 @@ NONE: Interval = (np.nan, np.nan)
 RESAMPLES = 1999
 LARGE = 2000
 """Samples from which on the normal limit is taken: there it differs from the bootstrap by less than
-the bootstrap from itself with another seed, and scipy's takes a time of the square of the samples.
+the bootstrap from itself with another seed, and resamples of so many take much memory.
 """
 LEAST_OF_BOOTSTRAP = 8
 """Samples below which bootstrap intervals are too short, Efron and Tibshirani (1993)."""
@@ -38,8 +39,6 @@ _FLAT = 0.5
 """Least fourth moment over the variance's square, less 1, that is believed of a resample: few
 samples may be of two values, whose moments tell of no error.  Uniform values have 0.8.
 """
-_BATCH = 1 << 23
-"""Numbers that the bootstrap holds at once, about."""
 
 
 def spread(values: Array, axis: int = -1) -> Array:
@@ -77,8 +76,8 @@ def all_alike(least: Array | float, most: Array | float) -> Any:
 def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
     """Interval of the mean (``np.mean``) or of the ``spread`` of independent samples.
 
-    Of the mean the bootstrap with bias correction and acceleration (BCa), Efron (1987); of the
-    spread that of ``_of_spread``; from LARGE samples on the normal limit.  NaN below 8 samples.
+    Of the mean that of ``_of_mean``; of the spread that of ``_of_spread``; from LARGE samples on
+    the normal limit.  NaN below 8 samples.
     """
     count = values.shape[-1]
     if count < LEAST_OF_BOOTSTRAP:
@@ -90,15 +89,40 @@ def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array,
     # Values that are all alike have no bootstrap distribution: they are told as they are.
     told = np.where(alike[..., None], np.arange(count), values)
     known = statistic(values, axis=-1)
-    if statistic is not np.mean:
+    if statistic is np.mean:
+        low, high = np.moveaxis(np.apply_along_axis(_of_mean, -1, told), -1, 0)
+    else:
         low, high = _of_spread(told)
-        return np.where(alike, known, low), np.where(alike, known, high)
-    batch = max(1, _BATCH // values.size)
-    found = scipy.stats.bootstrap(
-        (told,), statistic, n_resamples=RESAMPLES, batch=batch, axis=-1, vectorized=True,
-        confidence_level=LEVEL, method="BCa", rng=np.random.default_rng(0),
-    ).confidence_interval  # fmt: skip
-    return np.where(alike, known, found.low), np.where(alike, known, found.high)
+    return np.where(alike, known, low), np.where(alike, known, high)
+
+
+@lru_cache(maxsize=16)
+def _resamples(count: int) -> NDArray[np.int64]:
+    """Places of the samples of all resamples, shape (RESAMPLES, count), the same for all outputs
+    of so many samples, of which there are LARGE at most.
+    """
+    return np.random.default_rng(0).integers(0, count, (RESAMPLES, count))
+
+
+@lru_cache(maxsize=2)
+def _times(count: int) -> Array:
+    """How often each sample is in each of these, over the count, shape (RESAMPLES, count)."""
+    cells = _resamples(count) + np.arange(RESAMPLES)[:, None] * count
+    times = np.bincount(cells.ravel(), minlength=RESAMPLES * count).reshape(RESAMPLES, count)
+    return times / count
+
+
+def _of_mean(values: Array) -> Array:
+    """Interval of the mean of values, shape (n,), by the bootstrap with bias correction and
+    acceleration (BCa), Efron (1987); shape (2,).
+    """
+    known, means = values.mean(), values[_resamples(len(values))].mean(axis=1)
+    below = ((means < known).sum() + (means <= known).sum()) / (2 * RESAMPLES)
+    apart, shift = values - known, scipy.special.ndtri(below)
+    bend = (apart**3).sum() / (6 * (apart**2).sum() ** 1.5)
+    far = shift + scipy.special.ndtri([(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    levels = scipy.special.ndtr(shift + far / (1 - bend * far))
+    return np.asarray(np.quantile(means, levels))
 
 
 def _of_spread(values: Array) -> tuple[Array, Array]:
@@ -110,25 +134,18 @@ def _of_spread(values: Array) -> tuple[Array, Array]:
     Sources: Efron and Tibshirani, An introduction to the bootstrap (1993), section 12.5; Bonett,
     Computational Statistics and Data Analysis 50 (2006) 775, equation 3.
     """
-    count, rng = values.shape[-1], np.random.default_rng(0)
-    known = spread(values)
+    count, known = values.shape[-1], spread(values)
     scaled = (values - values.mean(axis=-1, keepdims=True)) / known[..., None]
-    powers = [scaled**k for k in (1, 2, 3, 4)]
-    far = []
-    for begin in range(0, RESAMPLES, size := max(1, _BATCH // count)):
-        rows = min(size, RESAMPLES - begin)
-        places = rng.integers(0, count, (rows, count)) + np.arange(rows)[:, None] * count
-        times = np.bincount(places.ravel(), minlength=rows * count).reshape(rows, count) / count
-        one, two, three, four = (each @ times.T for each in powers)
-        square = (two - one**2) * count / (count - 1)
-        fourth = four - 4 * three * one + 6 * two * one**2 - 3 * one**4
-        with np.errstate(divide="ignore", invalid="ignore"):
-            each = np.log(square) / 2 / _log_error(np.sqrt(square), fourth, count)
-        far.append(np.where(np.isfinite(each), each, -np.inf))
-    ranked = np.sort(np.concatenate(far, axis=-1), axis=-1)
+    powers = np.stack([scaled**k for k in (1, 2, 3, 4)])
+    one, two, three, four = powers @ _times(count).T
+    square = (two - one**2) * count / (count - 1)
+    fourth = four - 4 * three * one + 6 * two * one**2 - 3 * one**4
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = np.log(square) / 2 / _log_error(np.sqrt(square), fourth, count)
+    ranked = np.sort(np.where(np.isfinite(far), far, -np.inf), axis=-1)
     place = round((1 - LEVEL) / 2 * (RESAMPLES + 1))  # the 50th of 1,999, and as far from above
     error = _log_error(np.ones_like(known), np.mean(powers[3], axis=-1), count)
-    normal = float(scipy.stats.norm.ppf(0.5 + LEVEL / 2))
+    normal = float(scipy.special.ndtri(0.5 + LEVEL / 2))
     cut = int(count / (2 * np.sqrt(count - 4)))
     middle = np.sort(scaled, axis=-1)[..., cut : count - cut].mean(axis=-1, keepdims=True)
     fourth = count * ((scaled - middle) ** 4).sum(axis=-1) / (count - 1) ** 2
@@ -154,7 +171,7 @@ def _log_error(deviation: Array, fourth: Array, count: int) -> Array:
 def _limit(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
     """The normal limit; of the spread's logarithm, whose variance the fourth moment gives."""
     count, deviation = values.shape[-1], spread(values)
-    wide = scipy.stats.t.ppf(0.5 + LEVEL / 2, count - 1)
+    wide = scipy.special.stdtrit(count - 1, 0.5 + LEVEL / 2)
     if statistic is np.mean:
         half, mean = wide * deviation / np.sqrt(count), values.mean(axis=-1)
         return mean - half, mean + half
@@ -163,6 +180,7 @@ def _limit(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
     return deviation * np.exp(-log), deviation * np.exp(log)
 
 
+@cache
 def ranks(count: int, probability: float) -> tuple[int, int] | None:
     """Ranks, from 1, between which a quantile lies with at least LEVEL; None if there are none.
 
@@ -237,7 +255,9 @@ def jackknife_error(left_out: Array) -> Array:
 
 def student(replicates: int) -> float:
     """Half length of an interval over the standard error from so many replicates."""
-    return float(scipy.stats.t.ppf(0.5 + LEVEL / 2, replicates - 1)) if replicates > 1 else np.nan
+    if replicates < 2:
+        return np.nan
+    return float(scipy.special.stdtrit(replicates - 1, 0.5 + LEVEL / 2))
 
 
 def quantile_of_replicates(
@@ -288,8 +308,8 @@ def of_difference(
         return apart + np.nan, apart + np.nan
     both = one**2 + other**2
     each = one**4 / free + other**4 / more
-    half = np.sqrt(both) * scipy.stats.t.ppf(
-        0.5 + LEVEL / 2, both**2 / np.where(each > 0, each, 1.0)
+    half = np.sqrt(both) * scipy.special.stdtrit(
+        both**2 / np.where(each > 0, each, 1.0), 0.5 + LEVEL / 2
     )
     half = np.where(each > 0, half, 0.0)  # no scatter at all leaves no doubt
     return apart - half, apart + half
@@ -299,24 +319,20 @@ def of_difference(
 
 
 def share_interval(count: int, samples: int) -> Interval:
-    """Two-sided exact interval of a share.  Source: Clopper and Pearson, Biometrika 26 (1934)."""
-    low, high = scipy.stats.binomtest(count, samples).proportion_ci(LEVEL, method="exact")
-    return float(low), float(high)
+    """Two-sided exact interval of a share."""
+    return share_bounds(count, samples, 0.5 + LEVEL / 2)
 
 
-def share_bounds(count: int, samples: int, confidence: float) -> Interval:
-    """The lower and the upper one-sided bound of a share, each with the confidence by itself."""
-    low = (
-        scipy.stats.binomtest(count, samples, alternative="greater")
-        .proportion_ci(confidence, "exact")
-        .low
-    )
-    high = (
-        scipy.stats.binomtest(count, samples, alternative="less")
-        .proportion_ci(confidence, "exact")
-        .high
-    )
-    return float(low), float(high)
+def share_bounds(count: float, samples: float, confidence: float) -> Interval:
+    """The lower and the upper one-sided bound of a share, each with the confidence by itself;
+    effective numbers of samples are not whole ones.
+
+    Source: Clopper and Pearson, Biometrika 26 (1934).
+    """
+    inverse, others = scipy.special.betaincinv, samples - count
+    least = float(inverse(count, others + 1, 1 - confidence)) if count > 0 else 0.0
+    most = float(inverse(count + 1, others, confidence)) if others > 0 else 1.0
+    return least, most
 
 
 def samples_needed(violations: int, probability: float, confidence: float) -> int:
@@ -328,8 +344,8 @@ def samples_needed(violations: int, probability: float, confidence: float) -> in
     >>> samples_needed(0, 0.99, 0.9), samples_needed(0, 0.99865, 0.9)
     (230, 1705)
     """
-    others = scipy.stats.nbinom.isf(1.0 - confidence, violations + 1, 1.0 - probability)
-    return violations + 1 + int(others)
+    others = scipy.special.nbdtrik(confidence, violations + 1, 1.0 - probability)
+    return violations + 1 + int(np.ceil(others - 1e-9))  # but for round-off a whole number
 
 
 def _score(count: int, samples: int) -> Interval:

@@ -31,6 +31,7 @@ from ringsim.analysis.intervals import (
     numbers,
     quantities,
     ran,
+    share_bounds,
     standard_error,
 )
 from ringsim.analysis.requirements import OUTCOME, Requirement, violations
@@ -93,7 +94,7 @@ def mean_interval(values: Array, weights: Array, replicate: Replicate) -> Interv
     free = effective(weights) - 1
     if free < 1:
         return NONE
-    half = float(scipy.stats.t.ppf(0.5 + LEVEL / 2, free)) * _error(values, weights, centre)
+    half = float(scipy.special.stdtrit(free, 0.5 + LEVEL / 2)) * _error(values, weights, centre)
     return centre - half, centre + half
 
 
@@ -122,12 +123,10 @@ def share_interval(own: Mask, weights: Array, replicate: Replicate) -> Interval:
         error = _error(own.astype(float), weights, share)
         count = share * (1 - share) / error**2
         # Fewer degrees of freedom than the count tells: t instead of the normal distribution.
-        wide = scipy.stats.t.ppf(0.5 + LEVEL / 2, [len(own) - 1, max(effective(weights) - 1, 1)])
+        free = np.array([len(own) - 1, max(effective(weights) - 1, 1)])
+        wide = scipy.special.stdtrit(free, 0.5 + LEVEL / 2)
         count *= float(wide[0] / wide[1]) ** 2
-    hits, tail = share * count, (1 - LEVEL) / 2
-    low = scipy.stats.beta.ppf(tail, hits, count - hits + 1) if share > 0 else 0.0
-    high = scipy.stats.beta.ppf(1 - tail, hits + 1, count - hits) if share < 1 else 1.0
-    return float(low), float(high)
+    return share_bounds(share * count, count, 0.5 + LEVEL / 2)
 
 
 def decisive_of_mean(values: Array, weights: Array) -> float:
@@ -269,7 +268,7 @@ class Cap:
         low, high = mean_bounds(mean, len(values), error)
         if replicate is not None:
             scatter, free = standard_error(values, replicate)
-            half = float(scipy.stats.t.isf(error, free) * scatter) if free > 0 else np.nan
+            half = float(-scipy.special.stdtrit(free, error) * scatter) if free > 0 else np.nan
             low, high = np.fmin(low, mean - half), np.fmax(high, mean + half)
         return max(0.0, self.weight * low), min(1.0, self.weight * high + self.beyond)
 

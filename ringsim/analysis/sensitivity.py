@@ -4,7 +4,7 @@ Failures are outputs of their own, 0 or 1.  No index of an output is given where
 depend on inputs: what is left would be another population.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -97,7 +97,7 @@ def sensitivity(
     here = (held[:, None] * size + np.arange(size)).ravel()
     index, columns = campaign["sample"].to_numpy()[here], inputs.values[here]
     count, block = len(here), None if blocks is None else np.repeat(np.arange(len(held)), size)
-    tested: dict[bytes, tuple[float, list[indices.Bins]]] = {}
+    tested: dict[bytes, tuple[float, list[str]]] = {}
     found: dict[str, Found] = {}
     counts, gone = np.zeros((len(outputs), 4), dtype=np.int64), lost(campaign)[here]
     chance = np.full(len(outputs), np.nan)
@@ -108,14 +108,13 @@ def sensitivity(
         # Outputs that lack the same samples share the test, and the bins.
         if (key := missing.tobytes()) not in tested:
             tested[key] = dependence(missing, columns, block), []
-        chance[k], bins = tested[key]
+        chance[k], alike = tested[key]
         counts[k] = whole.sum(), len(whole) - whole.sum(), missing.sum(), (missing & gone).sum()
         if chance[k] < UNLIKELY:
             continue
         if blocks is None:
             if whole.sum() >= indices.LEAST_SAMPLES:
-                bins += [indices.Bins(c[whole]) for c in columns.T] if not bins else []
-                found[name] = _given(bins, values[whole], index[whole], placed)
+                alike.append(name)
         elif whole.sum() >= _LEAST_BLOCKS:
             number = held[whole]
             kept = Blocks(blocks.rows[number])
@@ -125,6 +124,11 @@ def sensitivity(
                 if blocks.of_indices
                 else _effects(rows, kept, blocks)
             )
+    for alike in (each for _, each in tested.values() if each):
+        rows = np.array([outputs[name][0][here] for name in alike])
+        whole = ~np.isnan(rows[0])
+        told = _given(columns[whole], rows[:, whole], index[whole], placed)
+        found |= dict(zip(alike, told, strict=True))
     coords = {"input": inputs.names} if blocks is None else {"factor": blocks.groups}
     made = _dataset(outputs, found, coords, block is not None)
     of = "samples" if block is None else "blocks"
@@ -167,9 +171,10 @@ def _effects(values: Array, kept: Blocks, blocks: Blocks) -> Found:
 
 
 def _given(
-    bins: list[indices.Bins], values: Array, index: NDArray[np.int64], placed: Placement
-) -> Found:
-    """Indices of all columns; intervals of designs whose parts are independent.
+    columns: Array, values: Array, index: NDArray[np.int64], placed: Placement
+) -> Iterator[Found]:
+    """Indices of all columns, shape (samples, columns), for each of the outputs, shape (outputs,
+    samples); intervals of designs whose parts are independent.
 
     Of Sobol' designs there are none: their points are so evenly spread that the residuals of bins
     do not scatter as the correction for chance takes it.
@@ -178,13 +183,15 @@ def _given(
     part = index % indices.PARTS if replicate is None else replicate
     part = np.unique(part, return_inverse=True)[1]
     certain = placed.has_intervals and placed.kind != "sobol" and part.max() > 0
-    told, chance = np.full((len(bins), 3), np.nan), np.full((len(bins), 1), np.nan)
-    chance[:] = indices.chance_level(bins, values)
+    bins = [indices.Bins(column) for column in columns.T]
+    told = np.full((len(values), len(bins), 3), np.nan)
     for k, each in enumerate(bins):
-        told[k, 0], left_out = indices.index(each, values, part)
+        told[:, k, 0], left_out = indices.index(each, values, part)
         if certain:
-            told[k, 1:] = indices.interval(told[k, 0], left_out)
-    return {"given_data_index": (("input",), told), "chance_level": (("input",), chance)}
+            told[:, k, 1:] = np.stack(indices.interval(told[:, k, 0], left_out), axis=-1)
+    for one, level in zip(told, indices.chance_levels(bins, values), strict=True):
+        chance = np.full((len(bins), 1), level)
+        yield {"given_data_index": (("input",), one), "chance_level": (("input",), chance)}
 
 
 def _dataset(

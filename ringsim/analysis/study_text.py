@@ -152,13 +152,16 @@ class Section(NamedTuple):
     """What tells it at length, with every interval and measure."""
 
 
-def sections(analysis: xr.Dataset, folder: str = "DIR") -> dict[str, Section]:
+def sections(
+    analysis: xr.Dataset, folder: str = "DIR", *, full: bool = True
+) -> dict[str, Section]:  # fmt: skip
     """All that an analysis tells, by name, parts without rows and notes left out.
 
-    ``folder`` is the campaign's, for the commands that run samples again.
+    ``folder`` is the campaign's, for the commands that run samples again; unless ``full`` what
+    tells it at length is left out, which takes most of the time.
     """
     short = [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
-    every = [*sensitivity_tables(analysis), *influence_tables(analysis)]
+    more = _at_length(analysis) if full else {}
     found = (
         Section("tail", "Rare event", [tail_table(analysis)]),
         Section("outcomes", "Outcomes", [outcome_table(analysis)]),
@@ -166,15 +169,15 @@ def sections(analysis: xr.Dataset, folder: str = "DIR") -> dict[str, Section]:
             "statistics",
             "Numbers",
             [statistics_table(analysis)],
-            [statistics_table(analysis, every=True), every_statistic(analysis)],
+            more.get("statistics", ()),
         ),
         Section(
             "errors",
             "Numerical and statistical errors",
             error_tables(analysis),
-            error_tables(analysis, every=True),
+            more.get("errors", ()),
         ),
-        Section("matters", "What matters", short, every),
+        Section("matters", "What matters", short, more.get("matters", ())),
         Section("worst", "The worst samples", worst_tables(analysis, folder)),
         Section("requirements", "Requirements", [verdict_table(analysis)]),
         Section("reweighting", "Other distributions", reweighting_tables(analysis)),
@@ -183,6 +186,14 @@ def sections(analysis: xr.Dataset, folder: str = "DIR") -> dict[str, Section]:
         each.name: each._replace(tables=tables, more=[m for m in each.more if m.rows or m.notes])
         for each in found
         if (tables := [slim(t) for t in each.tables if t.rows or t.notes])
+    }
+
+
+def _at_length(analysis: xr.Dataset) -> dict[str, list[Table]]:
+    return {
+        "statistics": [statistics_table(analysis, every=True), every_statistic(analysis)],
+        "errors": error_tables(analysis, every=True),
+        "matters": [*sensitivity_tables(analysis), *influence_tables(analysis)],
     }
 
 
@@ -195,8 +206,8 @@ def told(analysis: xr.Dataset, folder: str = "DIR", *, full: bool = False) -> li
     lines = [*head_lines(analysis)]
     if not full:
         lines.append("--full gives all statistics with intervals and convergence, and all inputs")
-    for each in sections(analysis, folder).values():
-        chosen = each.more if full and each.more else each.tables
+    for each in sections(analysis, folder, full=full).values():
+        chosen = each.more or each.tables
         parts = [table.lines() for table in chosen]
         if each.name == "worst":
             parts = [worst_lines(analysis, folder)]
@@ -257,7 +268,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
     """The verdicts, a row a requirement; no rows without requirements."""
     rows, notes = [], [_DECIDES] * bool(analysis.sizes.get("requirement"))
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
-        one = {str(n): v.item() for n, v in analysis.sel(requirement=name).items() if not v.dims}
+        variables = analysis.sel(requirement=name).variables
+        one = {str(n): v.values.item() for n, v in variables.items() if not v.dims}
         verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
         further = one["further_samples"]
         rows.append((
@@ -399,7 +411,8 @@ def too_few() -> str:
 def unit_of(analysis: xr.Dataset, name: str) -> tuple[float, str]:
     """Factor and unit in which tables tell an output; empty where it has none."""
     factor, units = readable(
-        str(analysis[name].attrs["units"]), np.nanmax(np.abs(analysis[name].values), initial=0.0)
+        str(analysis.variables[name].attrs["units"]),
+        np.nanmax(np.abs(analysis.variables[name].values), initial=0.0),
     )
     return factor, unit_text(units)
 
@@ -426,8 +439,8 @@ def every_statistic(analysis: xr.Dataset) -> Table:
             if np.isnan(value) or (same and statistic != "maximum"):
                 continue
             digits = 4 if statistic == "standard_deviation" else fine
-            first = factor * analysis[f"{name}_convergence"].values[:-1, k]
-            low, high = (factor * analysis[f"{name}_interval"].values[k]).tolist()
+            first = factor * analysis.variables[f"{name}_convergence"].values[:-1, k]
+            low, high = (factor * analysis.variables[f"{name}_interval"].values[k]).tolist()
             side, who = k - len(STATISTICS) + 2, ("-", "-")
             if side >= 0 and not same:
                 bar = factor * analysis[f"{name}_end_error"].values[side]
@@ -460,7 +473,7 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         if is_moment(name) and not wanted:
             continue
         errors, counts, largest, samples = (
-            analysis[f"{name}_{word}"].values
+            analysis.variables[f"{name}_{word}"].values
             for word in ("error_of_mean", "error_samples", "largest_error", "largest_error_sample")
         )
         mean, *_, least, most = analysis[name].values

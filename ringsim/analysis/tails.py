@@ -68,7 +68,7 @@ def agreement(each: Array, chains: Array) -> float:
     if len(each) < 2 or not (each > 0.0).all() or not 0.0 < square < np.inf:
         return np.nan
     free = len(each) - 1
-    return float(scipy.stats.chi2.sf(free * np.log(each).var(ddof=1) / square, free))
+    return float(scipy.special.chdtrc(free, free * np.log(each).var(ddof=1) / square))
 
 
 def replicated_interval(each: Array, chains: Array, most: float = 1.0) -> tuple[Array, float]:
@@ -91,7 +91,7 @@ def replicated_interval(each: Array, chains: Array, most: float = 1.0) -> tuple[
     if agreement(each, chains) < DISAGREE:
         variation = float(each.std(ddof=1) / middle / count**0.5)
         return np.array([(1 - LEVEL) / 2 * middle, max(most, middle)]), variation
-    variation, half = np.nan, float(scipy.stats.norm.ppf(0.5 + LEVEL / 2)) * (square / count) ** 0.5
+    variation, half = np.nan, float(scipy.special.ndtri(0.5 + LEVEL / 2)) * (square / count) ** 0.5
     if count > 1:
         variation = float(each.std(ddof=1) / middle / count**0.5)
         half = max(half, student(count) * float(logs.std(ddof=1)) / count**0.5)

@@ -200,7 +200,7 @@ def bounds(
         share = float(kept.mean())
         error, free = standard_error(kept.astype(float), replicate)
         if free > 0:
-            below, above = (float(scipy.stats.t.ppf(level, free) * error) for level in levels)
+            below, above = (float(scipy.special.stdtrit(free, level) * error) for level in levels)
             low, high = max(0.0, min(low, share - below)), min(1.0, max(high, share + above))
     return low, high
 

@@ -268,8 +268,10 @@ def layout_of(scene: "Scene", coordinate: float | None = None) -> Layout:
     return scene.structure.layout(scene, q + 1j * STEP)
 
 
-def layout_at_opening(scene: "Scene", opening: float) -> Layout:
+def layout_at_opening(scene: "Scene", opening: float, first: Layout | None = None) -> Layout:
     """The layout at which the mean opening angle has a value (rad), by Newton's method.
+
+    ``first`` is the layout as the structure starts, if it is there already.
 
     Raises
     ------
@@ -278,7 +280,7 @@ def layout_at_opening(scene: "Scene", opening: float) -> Layout:
     """
     q = float(scene.structure.coordinate)
     for _ in range(30):
-        layout = layout_of(scene, q)
+        layout, first = first or layout_of(scene, q), None
         angles, rates = layout.opening_angles()
         missing = opening - float(angles.mean())
         if abs(missing) < 1e-12:

@@ -140,11 +140,11 @@ def _poses(scene: Scene, lowest: float) -> dict[str, Any]:
     all other points follow the mean, as in the figure ``ringsim.plots.ring``.
     """
     means = np.linspace(min(lowest, 0.98 * np.pi), np.pi, POSES)
-    points = points_of(layout_of(scene))
+    points = points_of(first := layout_of(scene))
     fixed, shape = len(points.names) - points.openings.size, np.ones(points.openings.shape)
     poses = []
     for mean in means:
-        layout = layout_at_opening(scene, float(mean))
+        layout = layout_at_opening(scene, float(mean), first)
         flat, folded = (
             points.places(layout, angle * shape) - middle_of(layout) for angle in (np.pi, 0.0)
         )

@@ -24,7 +24,7 @@ def test_the_level_is_that_of_the_largest_index_of_all_columns_by_chance():
         columns[1] = columns[0] + 0.1 * columns[1]  # alike: no two chances
         bins = [indices.Bins(column) for column in columns]
         largest = max(indices.index(each, output, none)[0] for each in bins)
-        found.append(largest > indices.chance_level(bins, output))
+        found.append(largest > indices.chance_levels(bins, output[None])[0])
     assert LEAST <= np.mean(found) <= MOST
 
 
@@ -36,7 +36,7 @@ def test_shuffles_of_all_columns_at_once_are_those_one_by_one():
     shuffle = np.random.default_rng(0)
     each = [shuffle.permutation(output) for _ in range(199)]
     largest = [max(indices.index(one, y, none)[0] for one in bins) for y in each]
-    assert indices.chance_level(bins, output) == pytest.approx(np.quantile(largest, 0.95))
+    assert indices.chance_levels(bins, output[None])[0] == pytest.approx(np.quantile(largest, 0.95))
 
 
 @pytest.mark.parametrize("measure", [indices.correlations, indices.partial_correlations])
@@ -102,8 +102,8 @@ def test_of_many_samples_the_distribution_tells_what_shuffles_do(
     random = np.random.default_rng(8)
     columns = [indices.Bins(column) for column in random.random((30, 20_000))]
     output = (random.random(20_000) < rare).astype(float)
-    quick = indices.chance_level(columns, output)
+    quick = indices.chance_levels(columns, output[None])[0]
     monkeypatch.setattr(indices, "_MANY", 10**9)
-    shuffled = indices.chance_level(columns, output)
+    shuffled = indices.chance_levels(columns, output[None])[0]
     assert quick != shuffled
     assert quick == pytest.approx(shuffled, rel=0.1)

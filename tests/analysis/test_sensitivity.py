@@ -326,7 +326,7 @@ def test_given_data_indices_are_corrected_for_chance():
         found.append(indices.index(indices.Bins(x), y, np.zeros(1000, dtype=int))[0])
     # Standard error of the mean of 100: sqrt(2 * 19) / 1000 / 10 = 0.0006.
     assert abs(np.mean(found)) < 0.002
-    levels = [indices.chance_level([indices.Bins(x)], y)]
+    levels = [indices.chance_levels([indices.Bins(x)], y[None])[0]]
     assert 0.02 < np.mean(np.array(found) > levels) * 2 < 0.2
     assert levels[0] == pytest.approx(np.quantile(found, 0.95), abs=0.006)
 

@@ -50,9 +50,14 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     blocks = -(-len(sections) // columns)
     rows = blocks * len(planes)
     figure = Figure(figsize=(max(1.75 * columns, 7.0), max(1.3 * rows, 2.4) + 2.0))
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    grid = figure.subplots(rows, columns, squeeze=False)
+    limits = _limits([each for each in (found, one) if each is not None])
     axes: Axes
     for place, axes in enumerate(grid.ravel()):
+        # By itself, and before its curves: axes that are shared ask each other for limits.
+        axes.set(xlim=(0.0, float(found["time"][-1]) or 1.0), ylim=limits)
+        axes.xaxis.set_major_locator(MaxNLocator(3))
+        axes.label_outer()
         row, column = divmod(place, columns)
         number, plane = row // len(planes) * columns + column, planes[row % len(planes)]
         if number >= len(sections):
@@ -74,10 +79,6 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
         if plane == planes[-1] and number + columns >= len(sections):
             axes.tick_params(labelbottom=True)
             axes.set_xlabel(style.label(found["time"], width=24), fontsize=8)
-    drawn = [each for each in (found, one) if each is not None]
-    grid[0, 0].set_ylim(*_limits(drawn))
-    grid[0, 0].set_xlim(0.0, float(found["time"][-1]) or 1.0)
-    grid[0, 0].xaxis.set_major_locator(MaxNLocator(3))
     figure.supylabel(style.label(found, width=26), fontsize=10)
     words = [
         Line2D([], [], color=colour, linestyle=dashes, linewidth=width, label=f"{plane} plane")
