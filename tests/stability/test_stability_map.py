@@ -157,7 +157,10 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     assert "Stiffness (N)" in [axes.get_xlabel() for axes in figure.axes]
 
 
-BARS = {"deployment_time_error": [0.1], "peak_tension_error": [0.2]}
+BARS = {
+    "deployment_time_error": [0.1], "peak_tension_error": [0.2],
+    "asynchrony_max": [2.0], "asynchrony_max_error": [1e-9],
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -167,6 +170,9 @@ BARS = {"deployment_time_error": [0.1], "peak_tension_error": [0.2]}
         (GOOD, {"deployment_time": [3.19]}, "agree"),
         (GOOD, {"deployment_time": [3.21]}, "deployment_time"),
         (GOOD, {"peak_tension": [10.41]}, "peak_tension"),
+        # Round-off of rings whose sections are all alike.
+        (GOOD, {"asynchrony_max": [2.0 + 9e-5], "asynchrony_max_error": [1e-9]}, "agree"),
+        (GOOD, {"asynchrony_max": [2.0 + 2e-4], "asynchrony_max_error": [1e-9]}, "asynchrony_max"),
         (GOOD, {"peak_tension": [99.0], "peak_tension_error": [np.nan]}, "agree"),
         (CUT_OFF, {}, "outcome"),
         (NEWTON, {"deployment_time": [99.0]}, "status"),
