@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -180,27 +181,32 @@ def _limit(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
     return deviation * np.exp(-log), deviation * np.exp(log)
 
 
+_FAR = 6.0
+"""Standard deviations of a count beyond which no rank is sought: 1e-9 of all counts."""
+
+
 @cache
 def ranks(count: int, probability: float) -> tuple[int, int] | None:
     """Ranks, from 1, between which a quantile lies with at least LEVEL; None if there are none.
 
     The closest pair of ranks, for any continuous distribution; of those as close the one with the
-    most equal tails.  Source: David and Nagaraja, Order Statistics (2003), section 7.1.
+    most equal tails, and of two alike the lower.  Source: David and Nagaraja, Order Statistics
+    (2003), section 7.1.
 
     >>> ranks(100, 0.5), ranks(58, 0.05), ranks(59, 0.05)
     ((40, 60), None, (1, 10))
     """
-    most = int(scipy.stats.binom.ppf(1.0 - 1e-6, count, probability)) + 1
-    least = max(1, int(scipy.stats.binom.ppf(1e-6, count, probability)))
-    below = np.asarray(
-        scipy.stats.binom.cdf(np.arange(least - 1, min(most, count)), count, probability)
-    )
+    middle, spread = count * probability, math.sqrt(count * probability * (1.0 - probability))
+    least = max(1, int(middle - _FAR * spread) - 1)
+    most = min(int(middle + _FAR * spread) + 2, count)
+    below = scipy.special.bdtr(np.arange(least - 1, most, dtype=float), count, probability)
     # below[k] is the probability that rank least + k lies above the quantile.
     best: tuple[float, ...] | None = None
     for low in range(len(below)):
         high = int(np.searchsorted(below, below[low] + LEVEL))
         if high < len(below):
-            tails = abs(below[low] - (1.0 - below[high]))
+            # Rounded: around the median pairs come in twos whose tails are each other's mirror.
+            tails = round(abs(below[low] - (1.0 - below[high])), 9)
             best = min(filter(None, [best, (high - low, tails, low)]))
     if best is None:
         return None
@@ -350,8 +356,10 @@ def samples_needed(violations: int, probability: float, confidence: float) -> in
 
 def _score(count: int, samples: int) -> Interval:
     """The two-sided score interval of a share.  Source: Wilson, J. Am. Stat. Ass. 22 (1927)."""
-    low, high = scipy.stats.binomtest(count, samples).proportion_ci(LEVEL, method="wilson")
-    return float(low), float(high)
+    share, far = count / samples, scipy.special.ndtri(0.5 + LEVEL / 2) ** 2 / samples
+    half = math.sqrt(far * (share * (1.0 - share) + far / 4.0))
+    low, high = ((share + far / 2.0 + side * half) / (1.0 + far) for side in (-1.0, 1.0))
+    return max(float(low), 0.0), min(float(high), 1.0)
 
 
 def difference_of_shares(first: tuple[int, int], second: tuple[int, int]) -> Interval:
