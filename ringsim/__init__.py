@@ -19,21 +19,22 @@ if TYPE_CHECKING:
     from ringsim.analysis.comparison import compare
     from ringsim.analysis.study import analyse
     from ringsim.campaign.python import Campaign, CampaignError, open_campaign
+    from ringsim.measured import load_measured
     from ringsim.refusal import InputError
     from ringsim.scene import Scene, load_scene
     from ringsim.simulation import simulate
     from ringsim.stored_state import read_state
 
 __all__ = [
-    "Campaign", "CampaignError", "InputError", "Scene", "analyse", "compare", "load_scene",
-    "open_campaign", "read_state", "simulate",
+    "Campaign", "CampaignError", "InputError", "Scene", "analyse", "compare", "load_measured",
+    "load_scene", "open_campaign", "read_state", "simulate",
 ]  # fmt: skip
 
 _HOMES = {
     "analyse": "analysis.study", "compare": "analysis.comparison",
     "Campaign": "campaign.python", "CampaignError": "campaign.python",
     "open_campaign": "campaign.python", "InputError": "refusal",
-    "Scene": "scene", "load_scene": "scene", "simulate": "simulation",
+    "load_measured": "measured", "Scene": "scene", "load_scene": "scene", "simulate": "simulation",
     "read_state": "stored_state",
 }  # fmt: skip
 _OF_DATASETS = ("analyse", "compare", "Campaign", "open_campaign", "simulate")

@@ -106,6 +106,18 @@ class Ring:
             drawn[each.name] = figure
         return drawn if name is None else drawn[name]
 
+    def residuals(self, measured: str | Path) -> xr.Dataset:
+        """Measured data less this run by ``sensor``, of the TOML file that describes them, as
+        ``ringsim compare RUN FILE`` lists them: in the units of each variable, and over the
+        standard deviation of a reading.
+
+        InputError if the file is refused, or the run lacks what a sensor measures.
+        """
+        from ringsim.analysis.residuals import residual_statistics, residuals
+        from ringsim.measured import load_measured
+
+        return residual_statistics(residuals(self._dataset, load_measured(measured)))
+
     def leader(self) -> xr.Dataset:
         """Which V-joint is most open and which least.
 

@@ -29,7 +29,7 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_NOT_MET
 from ringsim.files import MERGED, require_file, require_place, writing
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
-from ringsim.tables import counted
+from ringsim.tables import counted, slim
 
 
 def opened(path: Path) -> xr.Dataset:
@@ -222,10 +222,16 @@ def _load(file: Path) -> xr.Dataset:
     "--sample", type=int, metavar="N",
     help="Sample of a campaign for --animate (default: the worst).",
 )  # fmt: skip
+@click.option(
+    "--measured",
+    metavar="TOML",
+    type=PATH,
+    help="Draw the measured data of this file over the run, and nothing else.",
+)
 @click.option("--out", metavar="DIR", type=PATH, help="Folder for the figures (default: FILE's).")
 def plot_command(
     file: Path, formats: Formats, *, animate: bool, colour: str | None,
-    sample: int | None, out: Path | None,
+    sample: int | None, measured: Path | None, out: Path | None,
 ) -> None:  # fmt: skip
     """Draw the figures of a run, or of a campaign, from its FILE.
 
@@ -245,6 +251,9 @@ def plot_command(
                 "ringsim campaign has written (campaign.nc)"
             )
         folder = out or file.parent
+        if measured is not None:
+            _draw_measured(dataset, measured, folder, file.stem, formats)
+            return
         drawn = draw_figures(dataset, folder, file.stem, formats)
         if why := left_out(dataset):
             click.echo(why)
@@ -253,6 +262,24 @@ def plot_command(
         elif animate:
             run, name = _shown(dataset, sample, file)
             write_animation(run.load(), folder / f"{name}.gif", colour)
+
+
+def _draw_measured(
+    dataset: xr.Dataset, measured: Path, folder: Path, stem: str, formats: Formats
+) -> None:
+    from ringsim.analysis.residuals import residuals
+    from ringsim.measured import load_measured
+    from ringsim.plots import figures, style
+    from ringsim.plots.measured import measured_and_computed
+
+    measurement = load_measured(measured)
+    title = measurement.file.title or measurement.file.name
+    figure = measured_and_computed(residuals(dataset, measurement), title)
+    style.in_readable_units(figure)
+    for written in figures.write_figure(
+        figure, folder, f"{stem}-fig-measured", formats or ("png",)
+    ):
+        click.echo(f"wrote {written}")
 
 
 def _shown(dataset: xr.Dataset, sample: int | None, file: Path) -> tuple[xr.Dataset, str]:
@@ -286,16 +313,25 @@ def _require_sample(dataset: xr.Dataset, sample: int, file: Path) -> None:
 def compare_command(
     first: Path, second: Path, page: Path | None, out: Path | None, *, pdf: bool
 ) -> None:
-    """Compare SECOND with FIRST: two campaigns (folders or files), or two runs.
+    """Compare SECOND with FIRST: two campaigns (folders or files), two runs, or a run with measured
+    data (a TOML file).
 
     Samples with equal seeds or inputs are compared in pairs, which shows much smaller differences.
     """
-    from ringsim.analysis.comparison import compare
-    from ringsim.analysis.comparison_text import compared
-
     require_with("--pdf", pdf or None, "--report", page is not None)
     if out is not None:
         require_file(out)
+    if second.suffix == ".toml":
+        if page is not None:
+            raise InputError(
+                "--report: a page compares two results: leave it out, and draw measured data with "
+                f"ringsim plot {first} --measured {second}"
+            )
+        _compare_measured(first, second, out)
+        return
+    from ringsim.analysis.comparison import compare
+    from ringsim.analysis.comparison_text import compared
+
     if page is not None:
         _require_page("--report", page, pdf=pdf)
     with opened(first) as one, opened(second) as other:
@@ -312,6 +348,18 @@ def compare_command(
             from ringsim.report.page import write_comparison
 
             _told_page(page, write_comparison(found, one, other, page), pdf=pdf)
+
+
+def _compare_measured(run: Path, measured: Path, out: Path | None) -> None:
+    from ringsim.analysis import residuals
+    from ringsim.measured import load_measured
+
+    measurement = load_measured(measured)
+    with opened(run) as dataset:
+        found = residuals.residuals(dataset, measurement)
+    for line in slim(residuals.residual_table(found)).lines():
+        click.echo(line)
+    _save(residuals.residual_statistics(found), out)
 
 
 def _named(dataset: xr.Dataset, path: Path) -> str:

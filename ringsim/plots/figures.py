@@ -75,13 +75,25 @@ def draw_figures(
     InputError
         If the folder or a file cannot be written.
     """
-    folder, written = Path(folder), []
+    folder = Path(folder)
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    for each, figure in figures_of(dataset):
-        for kind in formats:
-            path = folder / f"{name}-fig-{each.name}.{kind}"
-            with writing(folder):
-                style.write(figure, path)
-            written.append(path)
+    return [
+        path for each, figure in figures_of(dataset)
+        for path in write_figure(figure, folder, f"{name}-fig-{each.name}", formats)
+    ]  # fmt: skip
+
+
+def write_figure(
+    figure: Figure, folder: Path, stem: str, formats: Sequence[str] = ("png",)
+) -> list[Path]:
+    """Write a figure as STEM.png, or in other formats, into a folder; the files.
+
+    InputError if the folder or a file cannot be written.
+    """
+    written = [folder / f"{stem}.{kind}" for kind in formats]
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in written:
+            style.write(figure, path)
     return written

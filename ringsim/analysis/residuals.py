@@ -1,0 +1,147 @@
+"""What a run says beside measured data: differences by sensor, in units and in scatter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from ringsim.measured import Measurement, Readings
+from ringsim.outputs.family import VARIABLES
+from ringsim.refusal import InputError, known_or_nearest, show
+from ringsim.stepping.instant import Array
+from ringsim.tables import Table, counted, number_text, readable, unit_text
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Of one sensor: readings that the run has a value for, and that value."""
+
+    readings: Readings
+    times: Array
+    """s, shape (n,)."""
+    measured: Array
+    computed: Array
+    outside: int
+    """Readings before the first or after the last value of the run."""
+
+    @property
+    def apart(self) -> Array:
+        """Measured less computed, in the variable's units."""
+        return self.measured - self.computed
+
+    @property
+    def in_deviations(self) -> Array:
+        """The same over the standard deviation of a reading."""
+        return self.apart / self.readings.deviation
+
+
+def residuals(run: xr.Dataset, measurement: Measurement) -> list[Residuals]:
+    """Of every sensor of a test; values of the run between its records are linear.
+
+    Raises
+    ------
+    InputError
+        If the run has not the variable or the place of a sensor, or is a campaign.
+    """
+    if "sample" in run.dims:
+        raise InputError(
+            "measured data are compared with a run, and this is a campaign: give the run of one "
+            "sample (ringsim replay DIR SAMPLE --save FILE)"
+        )
+    return [_of(run, readings) for readings in measurement.readings]
+
+
+def _of(run: xr.Dataset, readings: Readings) -> Residuals:
+    sensor = readings.sensor
+    if sensor.variable not in run:
+        raise InputError(
+            f"sensor {sensor.name}: the run has no {sensor.variable}: simulate it with what "
+            f"records it (ringsim explain {sensor.variable})"
+        )
+    found = run[sensor.variable]
+    for dim, label in sensor.place.items():
+        labels = found[dim].values.tolist()
+        if label not in labels:
+            hint = known_or_nearest(str(label), list(map(str, labels)))
+            raise InputError(f"sensor {sensor.name}: the run has no {dim} {show(label)} ({hint})")
+        found = found.sel({dim: label})
+    if "time" not in found.dims:
+        return Residuals(readings, readings.times, readings.values, np.full(1, float(found)), 0)
+    known = np.isfinite(found.values)
+    times, values = found["time"].values[known], found.values[known]
+    at = readings.times
+    inside = (at >= times[0]) & (at <= times[-1]) if len(times) else np.zeros(len(at), dtype=bool)
+    computed = np.interp(at[inside], times, values) if inside.any() else np.zeros(0)
+    return Residuals(readings, at[inside], readings.values[inside], computed, int((~inside).sum()))
+
+
+def residual_statistics(found: list[Residuals]) -> xr.Dataset:
+    """Statistics by ``sensor``: readings that are compared, and that lie outside of the run; mean,
+    root mean square and largest of measured less computed, in the variable's units, and when the
+    largest is; the root mean square over the standard deviation of a reading.
+    """
+    names = [each.readings.sensor.name for each in found]
+    rows = {
+        "compared": [len(each.times) for each in found],
+        "outside": [each.outside for each in found],
+        "mean_difference": [_mean(each.apart) for each in found],
+        "rms_difference": [_rms(each.apart) for each in found],
+        "largest_difference": [_farthest(each)[0] for each in found],
+        "largest_difference_time": [_farthest(each)[1] for each in found],
+        "rms_in_deviations": [_rms(each.in_deviations) for each in found],
+        "variable_units": [VARIABLES[each.readings.sensor.variable].units for each in found],
+    }
+    every = np.concatenate([np.zeros(0), *(each.in_deviations for each in found)])
+    return xr.Dataset(
+        {name: ("sensor", np.array(row)) for name, row in rows.items()},
+        {"sensor": names}, {"rms_in_deviations": _rms(every), "compared": len(every)},
+    )  # fmt: skip
+
+
+def _mean(values: Array) -> float:
+    return float(values.mean()) if len(values) else np.nan
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
+
+
+def _farthest(each: Residuals) -> tuple[float, float]:
+    if not len(each.apart):
+        return np.nan, np.nan
+    k = int(np.argmax(np.abs(each.apart)))
+    return float(each.apart[k]), float(each.times[k])
+
+
+def residual_table(found: list[Residuals]) -> Table:
+    """The statistics as a table, the sensor that fits worst first."""
+    told, rows = residual_statistics(found), []
+    sizes = np.nan_to_num(told["rms_in_deviations"].values, nan=-1.0)
+    for k in np.argsort(-sizes, kind="stable").tolist():
+        one = told.isel(sensor=k)
+        units = str(one["variable_units"].values)
+        largest = float(one["largest_difference"])
+        factor, units = readable(units, np.nan_to_num(largest))
+        readings = found[k].readings
+        rows.append((
+            str(one["sensor"].values), unit_text(units), str(int(one["compared"])),
+            str(int(one["outside"])) if one["outside"] else "-",
+            str(readings.missing) if readings.missing else "-",
+            str(readings.gaps) if readings.gaps else "-",
+            *(number_text(factor * float(one[n]), 3)
+              for n in ("mean_difference", "rms_difference", "largest_difference")),
+            number_text(float(one["largest_difference_time"]), 4),
+            number_text(factor * readings.deviation, 2),
+            number_text(float(one["rms_in_deviations"]), 3),
+        ))  # fmt: skip
+    head = (
+        "sensor", "unit", "readings", "outside the run", "empty cells", "gaps",
+        "mean difference", "rms difference", "largest difference", "at (s)", "sigma", "rms / sigma",
+    )  # fmt: skip
+    notes = [
+        "difference: measured less computed; rms / sigma is 1 where nothing but the scatter of "
+        "the readings sets them apart, and more where the model or its values do",
+        f"all sensors: rms / sigma {number_text(told.attrs['rms_in_deviations'], 3)} in "
+        f"{counted(told.attrs['compared'], 'reading')}",
+    ]
+    return Table(head, rows, notes)

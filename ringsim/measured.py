@@ -1,0 +1,277 @@
+"""Measured data of a test: which column of a table is which sensor, and what its numbers are worth.
+
+A TOML file names a CSV table beside it, its clock, and its sensors::
+
+    name = "stand-3"
+    file = "stand-3.csv"
+
+    [clock]
+    column = "t"
+    unit = "ms"
+    offset = 0.12            # s: time of the run = offset + (1 + drift) * reading
+
+    [[sensors]]
+    column = "encoder 3"
+    variable = "opening_angle"
+    place = { plane = "upper", section = 3 }
+    unit = "deg"
+    standard_deviation = 0.1
+"""
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, ValidationError, model_validator
+
+from ringsim.files import parse_toml, read_text
+from ringsim.outputs.family import VARIABLES, Array
+from ringsim.refusal import InputError, explain, known_or_nearest, show
+from ringsim.units import ListIn, Model, Second, Unit
+
+_UNITS = {
+    "s": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "degree": {"deg": 1.0, "degree": 1.0, "rad": math.degrees(1.0)},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": 9.80665},
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
+    "A": {"A": 1.0, "mA": 1e-3},
+    "W": {"W": 1.0, "mW": 1e-3},
+    "N m": {"N m": 1.0, "mN m": 1e-3},
+    "rad/s": {"rad/s": 1.0, "deg/s": math.radians(1.0), "1/min": math.pi / 30.0},
+    "Pa": {"Pa": 1.0, "MPa": 1e6},
+    "m/s^2": {"m/s^2": 1.0, "g": 9.80665},
+}
+"""Units in which a test may give what files hold in the unit before the colon, and their size."""
+_NOTHING = {"", "nan", "na", "n/a", "null", "-"}
+"""Cells of a table without a reading."""
+_SEPARATORS = ",;\t"
+
+_Positive = Annotated[float, Field(gt=0.0, le=1e12)]
+_Number = Annotated[float, Field(ge=-1e12, le=1e12)]
+
+
+class Clock(Model):
+    """What the time of a reading is in the run: offset + (1 + drift) * reading."""
+
+    column: str
+    """Its column in the table."""
+    unit: str = "s"
+    """Of its readings: s, ms or min."""
+    offset: Annotated[float, Field(ge=-1e6, le=1e6), Unit("s")] = 0.0
+    """Time of the run at which the clock shows zero."""
+    drift: Annotated[float, Field(ge=-0.1, le=0.1), Unit("1")] = 0.0
+    """By how much the time of the run goes faster than the clock."""
+
+
+class Sensor(Model):
+    """One sensor: where it is, and how far its readings may be wrong."""
+
+    column: str = ""
+    """Its column in the table; left out where ``value`` is the one reading."""
+    value: _Number | None = None
+    """The one reading of a number, such as a lock time, in ``unit``."""
+    variable: str
+    """What it measures, by the variable of a run: opening_angle, cable_tension, lock_time, ..."""
+    place: dict[str, str | int] = Field(default_factory=dict)
+    """Where: a label for each dimension of the variable but time."""
+    unit: str
+    """Of its readings."""
+    standard_deviation: _Positive
+    """Of the scatter of one reading, in ``unit``."""
+    bias: _Number = 0.0
+    """What it reads too much, in ``unit``: it is taken off."""
+
+    @model_validator(mode="after")
+    def _usable(self) -> Self:
+        if bool(self.column) == (self.value is not None):
+            given = "both" if self.column else "neither"
+            raise ValueError(
+                f"column and value: {given} given: a sensor has one of them (a column of the "
+                "table, or the one value that was read)"
+            )
+        variable = VARIABLES.get(self.variable)
+        if variable is None:
+            hint = known_or_nearest(self.variable, VARIABLES)
+            raise ValueError(f"variable = {show(self.variable)} is none of a run ({hint})")
+        known = _UNITS.get(variable.units, {variable.units: 1.0})
+        if self.unit not in known:
+            raise ValueError(
+                f"unit = {show(self.unit)} is none for {self.variable}: choose "
+                f"{' or '.join(map(show, known))}"
+            )
+        if ("time" in variable.dims) == (self.value is not None):
+            want = "column" if "time" in variable.dims else "value"
+            raise ValueError(
+                f"variable = {show(self.variable)} "
+                f"{'has values over time' if want == 'column' else 'is one number'}: give {want}"
+            )
+        wanted = [dim for dim in variable.dims if dim != "time"]
+        if sorted(self.place) != sorted(wanted):
+            named = ", ".join(f"{dim} = ..." for dim in wanted)
+            raise ValueError(
+                f"place = {show(dict(self.place))} must tell where {self.variable} is measured: "
+                f"place = {{ {named} }}" if wanted else
+                f"place = {show(dict(self.place))}: {self.variable} has no place: leave it out"
+            )  # fmt: skip
+        return self
+
+    @property
+    def scale(self) -> float:
+        """How many of the variable's units are one of the sensor's."""
+        units = VARIABLES[self.variable].units
+        return _UNITS.get(units, {}).get(self.unit, 1.0)
+
+    @property
+    def name(self) -> str:
+        """What tables call it: "opening_angle upper 3"."""
+        return " ".join([self.variable, *map(str, self.place.values())])
+
+
+class Measured(Model):
+    """Content of a file of measured data."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
+    """Word for the test."""
+    title: Annotated[str, Field(max_length=300)] = ""
+    """One line for figures."""
+    file: str = ""
+    """The table of readings, beside this file: CSV with a row of heads."""
+    clock: Clock | None = None
+    """Of the table."""
+    sensors: Annotated[tuple[Sensor, ...], ListIn, Field(min_length=1, max_length=1000)]
+    """All that is to be compared."""
+    longest_gap: Second | None = None
+    """Gaps between readings that are longer are told; left out, ten times the usual distance."""
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        columns = [sensor.column for sensor in self.sensors if sensor.column]
+        if columns and not (self.file and self.clock):
+            raise ValueError(
+                f"sensors: column = {show(columns[0])} needs the table and its clock: add file = "
+                '"NAME.csv" and [clock] with column = "..."'
+            )
+        names = [sensor.name for sensor in self.sensors]
+        if twice := next((name for name in names if names.count(name) > 1), ""):
+            raise ValueError(f"sensors: two of them measure {twice}: leave one out")
+        return self
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What one sensor has read, in the units of a run's variable, without its bias."""
+
+    sensor: Sensor
+    times: Array
+    """Of the run, s, shape (n,); one NaN where it is a number without a time."""
+    values: Array
+    """Shape (n,)."""
+    deviation: float
+    """Standard deviation of one reading."""
+    missing: int
+    """Rows of the table without a reading."""
+    gaps: int
+    """Times between readings that are longer than usual."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A test: what its file says, and what its sensors have read."""
+
+    file: Measured
+    readings: tuple[Readings, ...]
+
+
+def load_measured(path: str | Path) -> Measurement:
+    """The measured data that a TOML file describes.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or refused, a cell is no number, or the clock stands or jumps back.
+    """
+    path = Path(path)
+    try:
+        file = Measured.model_validate(parse_toml(read_text(path), path.name))
+    except ValidationError as error:
+        raise InputError(explain(error, Measured, path.name)) from None
+    columns = _table(file, path.parent / file.file) if file.file else {}
+    return Measurement(file, tuple(_read(file, sensor, columns) for sensor in file.sensors))
+
+
+def _read(file: Measured, sensor: Sensor, columns: dict[str, Array]) -> Readings:
+    deviation = sensor.scale * sensor.standard_deviation
+    if sensor.value is not None or file.clock is None:
+        value = sensor.scale * ((sensor.value or 0.0) - sensor.bias)
+        if VARIABLES[sensor.variable].units == "s" and file.clock is not None:
+            value = file.clock.offset + (1.0 + file.clock.drift) * value
+        return Readings(sensor, np.full(1, np.nan), np.array([value]), deviation, 0, 0)
+    clock = file.clock
+    scale = _UNITS["s"][clock.unit]
+    times = clock.offset + (1.0 + clock.drift) * scale * columns[clock.column]
+    known = np.isfinite(columns[sensor.column])
+    values = sensor.scale * (columns[sensor.column][known] - sensor.bias)
+    apart = np.diff(times[known])
+    longest = file.longest_gap or (10.0 * float(np.median(apart)) if len(apart) else math.inf)
+    gaps = int((apart > longest).sum())
+    return Readings(sensor, times[known], values, deviation, int((~known).sum()), gaps)
+
+
+def _table(file: Measured, path: Path) -> dict[str, Array]:
+    """The columns that the clock and the sensors name, shape (rows,) each."""
+    assert file.clock is not None  # a file without one names no column
+    if file.clock.unit not in _UNITS["s"]:
+        known = " or ".join(map(show, _UNITS["s"]))
+        raise InputError(f"clock.unit = {show(file.clock.unit)} is no unit of time: choose {known}")
+    text = read_text(path)
+    lines = [row for row in text.splitlines() if row.strip() and not row.startswith("#")]
+    if len(lines) < 2:
+        raise InputError(f"{path.name}: has no readings: give a row of heads, and rows below it")
+    separator = max(_SEPARATORS, key=lines[0].count)
+    head, *rows = csv.reader(io.StringIO("\n".join(lines)), delimiter=separator)
+    head = [cell.strip() for cell in head]
+    wanted = dict.fromkeys([file.clock.column, *(s.column for s in file.sensors if s.column)])
+    for name in wanted:
+        if head.count(name) != 1:
+            hint = "two columns are called so" if name in head else known_or_nearest(name, head)
+            raise InputError(f"{path.name}: column {show(name)} is not in its heads ({hint})")
+    found = {name: np.empty(len(rows)) for name in wanted}
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(head):
+            raise InputError(
+                f"{path.name}: row {number} of its readings has {len(row)} cells, but there are "
+                f"{len(head)} heads: mend or leave out the row"
+            )
+        for name, column in found.items():
+            column[number - 1] = _number(row[head.index(name)], f"{path.name}: row {number}", name)
+    times = found[file.clock.column]
+    if not np.isfinite(times).all():
+        place = int(np.argmin(np.isfinite(times))) + 1
+        raise InputError(f"{path.name}: row {place}: has no time: give it one, or leave it out")
+    if (back := np.flatnonzero(np.diff(times) <= 0.0)).size:
+        place, unit = int(back[0]) + 2, file.clock.unit
+        raise InputError(
+            f"{path.name}: row {place}: its time {times[place - 1]:g} {unit} is not after "
+            f"{times[place - 2]:g} {unit} of the row before: the clock stands or jumps: correct "
+            "the column, or cut the table there"
+        )
+    return found
+
+
+def _number(cell: str, where: str, column: str) -> float:
+    if cell.strip().lower() in _NOTHING:
+        return math.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(
+            f"{where}, column {show(column)}: {show(cell)} is no finite number: give one with a "
+            "decimal point, or leave the cell empty"
+        )
+    return value

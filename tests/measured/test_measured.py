@@ -1,0 +1,223 @@
+"""Measured data beside a run: readings made from a known run, and what a table may have wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from loops import for_each
+
+from ringsim.analysis.residuals import residual_statistics, residual_table, residuals
+from ringsim.cli import cli
+from ringsim.dataset import save
+from ringsim.measured import load_measured
+from ringsim.refusal import InputError
+from ringsim.scene import load_scene
+from ringsim.simulation import simulate
+
+pytestmark = pytest.mark.quick
+
+HEAD = """
+name = "stand-1"
+file = "stand.csv"
+clock = { column = "t", unit = "ms", offset = 0.5, drift = 0.001 }
+"""
+ENCODER = """
+[[sensors]]
+column = "enc"
+variable = "opening_angle"
+place = { plane = "upper", section = 2 }
+unit = "rad"
+standard_deviation = 0.002
+bias = 0.01
+"""
+CELL = """
+[[sensors]]
+column = "cell"
+variable = "cable_tension"
+place = { plane = "lower", span = 1 }
+unit = "kgf"
+standard_deviation = 0.02
+"""
+LOCK = """
+[[sensors]]
+variable = "lock_time"
+place = { plane = "upper", section = 1 }
+value = 34.0
+unit = "s"
+standard_deviation = 0.1
+"""
+
+
+@pytest.fixture(scope="module")
+def run() -> xr.Dataset:
+    """Two sections that open within 4 s."""
+    scene = load_scene("truss2").with_values({
+        "structure.opening_angle": 120.0, "record.interval": 0.05,
+        "cables.upper.winch.winding.speed": 0.1, "cables.lower.winch.winding.speed": 0.1,
+    })  # fmt: skip
+    return simulate(scene, "frame")
+
+
+def table(run: xr.Dataset, *, noise: bool = True) -> list[list[str]]:
+    """Readings of both sensors at 50 Hz, as their clock, units, bias and scatter make them."""
+    rng = np.random.default_rng(8)
+    at = np.arange(0.6, float(run["deployment_time"]) - 0.1, 0.02)
+    clock = 1e3 * (at - 0.5) / 1.001
+    angle = run["opening_angle"].sel(plane="upper", section=2).interp(time=at).values
+    pull = run["cable_tension"].sel(plane="lower", span=1).interp(time=at).values
+    scatter = rng.normal(size=(2, len(at))) * float(noise)
+    enc = np.radians(angle) + 0.01 + 0.002 * scatter[0]
+    cell = pull / 9.80665 + 0.02 * scatter[1]
+    rows = zip(clock, enc, cell, strict=True)
+    return [["t", "enc", "cell"], *([f"{x:.9g}" for x in row] for row in rows)]
+
+
+def written(folder: Path, toml: str, rows: list[list[str]], separator: str = ",") -> Path:
+    (folder / "stand.csv").write_text("\n".join(separator.join(row) for row in rows) + "\n")
+    (folder / "stand.toml").write_text(toml)
+    return folder / "stand.toml"
+
+
+def test_readings_of_the_run_itself_differ_from_it_by_nothing(
+    run: xr.Dataset, tmp_path: Path
+) -> None:
+    """Clock, units and bias undone: what is left is what nine digits of a table lose."""
+    file = written(tmp_path, HEAD + ENCODER + CELL, table(run, noise=False))
+    for each in residuals(run, load_measured(file)):
+        assert len(each.times) > 50
+        scale = np.abs(each.computed).max()
+        assert np.abs(each.apart).max() < 1e-6 * scale
+
+
+def test_scatter_alone_gives_one_standard_deviation(run: xr.Dataset, tmp_path: Path) -> None:
+    file = written(tmp_path, HEAD + ENCODER + CELL, table(run))
+    found = residual_statistics(residuals(run, load_measured(file)))
+    count = int(found["compared"][0])
+    # The root mean square of n normal numbers scatters by 1 / sqrt(2 n).
+    np.testing.assert_allclose(found["rms_in_deviations"], 1.0, atol=4.0 / np.sqrt(2 * count))
+    assert found.attrs["compared"] == 2 * count
+    np.testing.assert_allclose(
+        found["rms_difference"], [np.degrees(0.002), 0.02 * 9.80665], rtol=4.0 / np.sqrt(2 * count)
+    )
+
+
+def test_each_number_of_the_table_follows_from_the_readings(
+    run: xr.Dataset, tmp_path: Path
+) -> None:
+    rows = table(run)
+    rows[10][1] = f"{float(rows[10][1]) + 0.5:.9g}"
+    late = [f"{1e3 * (float(run['final_time']) + 1.0):.9g}", rows[-1][1], ""]
+    file = written(tmp_path, HEAD + ENCODER + CELL + LOCK, [*rows, late], separator="\t")
+    found = residual_table(residuals(run, load_measured(file)))
+    told = {row[0]: dict(zip(found.head, row, strict=True)) for row in found.rows}
+    encoder, cell = told["opening_angle upper 2"], told["cable_tension lower 1"]
+    assert (encoder["readings"], encoder["outside the run"]) == (str(len(rows) - 1), "1")
+    assert (cell["empty cells"], cell["gaps"]) == ("1", "-")
+    at = 0.5 + 1.001e-3 * float(rows[10][0])
+    assert float(encoder["at (s)"]) == pytest.approx(at, rel=1e-3)
+    assert float(encoder["largest difference"]) == pytest.approx(np.degrees(0.5), abs=1.0)
+    assert float(encoder["sigma"]) == pytest.approx(np.degrees(0.002), rel=0.05)
+    # A lock time is read by the same clock.
+    lock = 0.5 + 1.001 * 34.0 - float(run["lock_time"].sel(plane="upper", section=1))
+    row = told["lock_time upper 1"]
+    assert float(row["mean difference"]) == pytest.approx(lock, rel=5e-3)
+    assert float(row["rms / sigma"]) == pytest.approx(lock / 0.1, rel=5e-3)
+    assert found.rows[0][0] == "lock_time upper 1"  # the worst first
+
+
+def test_gaps_between_readings_are_counted(run: xr.Dataset, tmp_path: Path) -> None:
+    rows = table(run)
+    file = written(tmp_path, HEAD + ENCODER, rows[:20] + rows[40:])
+    (one,) = load_measured(file).readings
+    assert (one.gaps, one.missing) == (1, 0)
+    (shorter,) = load_measured(
+        written(tmp_path, HEAD + "longest_gap = 1.0\n" + ENCODER, rows[:20] + rows[40:])
+    ).readings
+    assert shorter.gaps == 0
+
+
+WRONG_FILES = {
+    "unknown variable": (ENCODER.replace("opening_angle", "opening_angel"),
+                         "did you mean opening_angle"),
+    "unit of another kind": (ENCODER.replace('"rad"', '"N"'), 'unit = "N" is none for'),
+    "no place": (ENCODER.replace('place = { plane = "upper", section = 2 }', ""),
+                 "place = { plane = ..., section = ... }"),
+    "a value over time": (ENCODER.replace('column = "enc"', "value = 3.0"), "give column"),
+    "neither": (ENCODER.replace('column = "enc"', ""), "neither given"),
+    "no scatter": (ENCODER.replace("standard_deviation = 0.002", "standard_deviation = 0.0"),
+                   "standard_deviation = 0.0 must be above 0"),
+    "twice": (ENCODER + ENCODER, "two of them measure opening_angle upper 2"),
+    "unknown column": (ENCODER.replace('"enc"', '"encoder"'), "did you mean enc?"),
+    "unknown key": (ENCODER + "sigma = 1.0\n", "sensors[1].sigma is not a known key"),
+}  # fmt: skip
+WRONG_ROWS = {
+    "text": (["3.0", "broken", "1"], 'column "enc": "broken" is no finite number'),
+    "infinite": (["3.0", "inf", "1"], 'column "enc": "inf" is no finite number'),
+    "comma": (["3.0", "1", "5", "1"], "has 4 cells, but there are 3 heads"),
+    "no time": (["", "1.0", "1"], "row 2: has no time"),
+    "back": (["1.0", "1.0", "1"], "row 2: its time 1 ms is not after 2 ms of the row before"),
+}
+
+
+GOOD = [["t", "enc", "cell"], ["2.0", "1.0", "1.0"]]
+WRONG = {name: (HEAD + toml, GOOD, words) for name, (toml, words) in WRONG_FILES.items()}
+WRONG |= {
+    name: (HEAD + ENCODER, [*GOOD, row, ["9.0", "1", "1"]], words)
+    for name, (row, words) in WRONG_ROWS.items()
+}
+WRONG |= {
+    "no readings": (HEAD + ENCODER, GOOD[:1], "has no readings"),
+    "no table": ('name = "x"\n' + ENCODER, GOOD, "needs the table"),
+    "no unit of time": (HEAD.replace('"ms"', '"h"') + ENCODER, GOOD, "is no unit of time"),
+}
+
+
+@for_each("toml, rows, words", WRONG.values(), ids=[*WRONG])
+def test_what_is_wrong_is_told_in_one_line(
+    toml: str, rows: list[list[str]], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError) as caught:
+        load_measured(written(tmp_path, toml, rows))
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_sensors_that_the_run_lacks_are_told(run: xr.Dataset, tmp_path: Path) -> None:
+    rows = table(run)
+    for toml, words in (
+        (ENCODER.replace("section = 2", "section = 9"), "the run has no section 9"),
+        (ENCODER.replace('"upper"', '"uper"'), "did you mean upper?"),
+        (CELL.replace("cable_tension", "motor_current").replace("span = 1", "winch = 1")
+         .replace("kgf", "A"), "the run has no motor_current"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=words.replace("?", r"\?")):
+            residuals(run, load_measured(written(tmp_path, HEAD + toml, rows)))
+    with pytest.raises(InputError, match="ringsim replay DIR SAMPLE --save"):
+        residuals(run.expand_dims("sample"), load_measured(written(tmp_path, HEAD + CELL, rows)))
+
+
+def test_commands_compare_and_draw(run: xr.Dataset, tmp_path: Path) -> None:
+    file = written(tmp_path, HEAD + ENCODER + CELL + LOCK, table(run))
+    save(run, tmp_path / "run.nc")
+    told = CliRunner().invoke(
+        cli, ["compare", str(tmp_path / "run.nc"), str(file), "--out", str(tmp_path / "fit.nc")]
+    )
+    assert told.exit_code == 0, told.output
+    assert "all sensors: rms / sigma" in told.output
+    with xr.open_dataset(tmp_path / "fit.nc") as stored:
+        assert stored.sizes["sensor"] == 3
+        xr.testing.assert_allclose(stored.load(), run.ring.residuals(file))
+    drawn = CliRunner().invoke(
+        cli, ["plot", str(tmp_path / "run.nc"), "--measured", str(file), "--plot-format", "png"]
+    )
+    assert drawn.exit_code == 0, drawn.output
+    assert (tmp_path / "run-fig-measured.png").stat().st_size > 10_000
+    refused = CliRunner().invoke(
+        cli, ["compare", str(tmp_path / "run.nc"), str(file), "--report", str(tmp_path / "a.html")]
+    )
+    assert refused.exit_code == 2
+    assert "--measured" in refused.output
