@@ -1,4 +1,4 @@
-"""Refusing bad input: one clear line, naming field, value, bound and cure."""
+"""Refusing bad input: one clear line, naming field, value, bound and cure; and how commands end."""
 
 import difflib
 import re
@@ -11,6 +11,15 @@ from pydantic.fields import FieldInfo
 
 from ringsim.choice import leaves_of
 from ringsim.units import EACH, LEFT_OUT, ONE, Model, nested_in, unit_of
+
+EXIT_DONE = 0
+EXIT_BAD_INPUT = 2
+EXIT_FAILED = 3
+"""The simulation failed, or too many samples of a campaign did."""
+EXIT_NOT_MET = 4
+"""A requirement is not met, or not yet shown to be (``analyse --gate``)."""
+EXIT_INTERRUPTED = 130
+"""Stopped by a signal, or samples are left: the same command goes on (128 + SIGINT)."""
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""

@@ -186,6 +186,8 @@ class Variable:
     """Variable with dimensions whose largest value, or magnitude, this number is."""
     least_of: str = ""
     """Variable with dimensions whose smallest value this number is."""
+    round_off: float = 0.0
+    """Difference of two engines' values that is none, whatever their error bars."""
 
     @property
     def badness(self) -> int:

@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import placement, population_of
-from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quantities
+from ringsim.analysis.intervals import CHECKED, Mask, good, is_moment, numbers, quantities
 from ringsim.analysis.ladder import Rung, references
-from ringsim.outputs.family import Array
+from ringsim.outputs.family import VARIABLES, Array
 from ringsim.tables import counted, text_table
 from ringsim.variables import GOALS, Fate, Outcome, Status
 
@@ -134,12 +134,17 @@ def _other_ends(campaign: xr.Dataset) -> list[str]:
     return [f"the outcome differs in {len(other)} of {int(ok.sum())}: {'; '.join(words)}"]
 
 
+def differ(name: str, apart: Array, bars: Array) -> Mask:
+    """Whether two engines' values of a variable are farther apart than both error bars together."""
+    return np.asarray(apart > bars + VARIABLES[name].round_off)
+
+
 def verdict(campaign: xr.Dataset, found: list[Difference]) -> list[str]:
     """Whether the engines differ by more than they state, and by more than the campaign allows."""
     beyond, stated = [], False
     for each in found:
         stated = stated or bool(np.isfinite(each.bars).any())
-        over = np.flatnonzero(each.apart > each.bars)
+        over = np.flatnonzero(differ(each.name, each.apart, each.bars))
         if len(over):
             k = over[np.argmax(each.apart[over] / each.bars[over])]
             beyond.append(

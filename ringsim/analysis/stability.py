@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.engines import held
+from ringsim.analysis.engines import differ, held
 from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
 from ringsim.tables import counted, markdown_table, unit_behind
@@ -26,8 +26,6 @@ AGREE = "agree"
 JUDGED = ("deployment_time", "asynchrony_max", "peak_tension")
 """Values with error bars that cells have."""
 _LONGEST_OF_BOTH = 120
-_ROUND_OFF = {"asynchrony_max": 1e-4}
-"""Differences that are none: sections that are all alike run apart by round-off, up to 5e-6 deg."""
 
 
 def compared(whole: xr.Dataset) -> xr.Dataset:
@@ -62,7 +60,7 @@ def _apart(full: xr.Dataset, frame: xr.Dataset) -> np.ndarray:
     for name in reversed(JUDGED):
         one, two = (cells[name].values for cells in (full, frame))
         bars = full[f"{name}_error"].values + frame[f"{name}_error"].values
-        found[np.abs(one - two) > bars + _ROUND_OFF.get(name, 0.0)] = name
+        found[differ(name, np.abs(one - two), bars)] = name
     same = (full["status"] == frame["status"]).values
     sound = same & (full["status"] == Status.OK).values
     found[sound & (full["cause"] != frame["cause"]).values] = "outcome"

@@ -19,10 +19,9 @@ from ringsim.campaign.specification import campaign_of, load_campaign
 from ringsim.campaign.stopping import is_behind, merge
 from ringsim.choice import kind_of
 from ringsim.execution.mpi import launched_size
-from ringsim.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.files import MERGED
 from ringsim.overrides import flat
-from ringsim.refusal import InputError
+from ringsim.refusal import EXIT_FAILED, EXIT_INTERRUPTED, InputError
 from ringsim.sampling.distributions import label_of
 from ringsim.scene import Scene
 from ringsim.units import Model

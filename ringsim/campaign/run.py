@@ -31,9 +31,8 @@ from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.slot import Local, Serial
 from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost
-from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.files import DESIGN, MERGED, write_text, writing
-from ringsim.refusal import InputError
+from ringsim.refusal import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED, InputError
 from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.distributions import Array
 from ringsim.scene import Scene

@@ -9,8 +9,14 @@ from typing import Any, TextIO
 import click
 from click.shell_completion import CompletionItem
 
-from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE, EXIT_INTERRUPTED
-from ringsim.refusal import InputError, NotBuiltError, known_or_nearest
+from ringsim.refusal import (
+    EXIT_BAD_INPUT,
+    EXIT_DONE,
+    EXIT_INTERRUPTED,
+    InputError,
+    NotBuiltError,
+    known_or_nearest,
+)
 
 VERBS = {
     "scenes": "List the built-in scenes.",

@@ -25,11 +25,10 @@ from ringsim.cli.options import (
 )
 from ringsim.execution.mpi import launched_size
 from ringsim.execution.work import load_solver, solve
-from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED
 from ringsim.files import MERGED, require_file
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.balance import rules
-from ringsim.refusal import InputError, show
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, InputError, show
 from ringsim.storage.result import Result, check_of
 from ringsim.variables import GOALS, TIMINGS, Outcome
 

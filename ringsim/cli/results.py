@@ -25,9 +25,8 @@ from ringsim.cli.options import (
     write_animation,
 )
 from ringsim.dataset import save
-from ringsim.exit_codes import EXIT_DONE, EXIT_NOT_MET
 from ringsim.files import MERGED, require_file, require_place, writing
-from ringsim.refusal import InputError, known_or_nearest
+from ringsim.refusal import EXIT_DONE, EXIT_NOT_MET, InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
 from ringsim.tables import counted, slim
 
@@ -270,7 +269,7 @@ def _draw_measured(
     from ringsim.analysis.residuals import residuals
     from ringsim.measured import load_measured
     from ringsim.plots import figures, style
-    from ringsim.plots.measured import measured_and_computed
+    from ringsim.plots.comparison import measured_and_computed
 
     measurement = load_measured(measured)
     title = measurement.file.title or measurement.file.name

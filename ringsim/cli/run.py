@@ -23,12 +23,11 @@ from ringsim.cli.options import (
     require_with,
     write_animation,
 )
-from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import require_file
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import summary
 from ringsim.parts.solver import Solver
-from ringsim.refusal import InputError
+from ringsim.refusal import EXIT_DONE, EXIT_FAILED, InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import Watch
 from ringsim.stepping.instant import Instant

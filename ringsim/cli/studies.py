@@ -10,8 +10,8 @@ import tomli_w
 
 from ringsim.campaign.panels import Panel, by_engines, panels_over
 from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
-from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import write_text
+from ringsim.refusal import EXIT_DONE, EXIT_FAILED
 from ringsim.scene import load_scene
 from ringsim.tables import counted
 

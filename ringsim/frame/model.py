@@ -103,6 +103,8 @@ class FrameModel:
         if not isinstance(scene.rods, GeometricallyExactRods):
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         drawn = layout_of(scene)
+        if drawn.contacts:
+            raise InputError(f"{NOT_HERE} contacts of bodies: {CURE}")
         self.scene = scene
         self.layout, self.prestress = assembled(drawn, scene.rods)
         self.ideal = OneCoordinate(scene, drawn)

@@ -65,6 +65,7 @@ class Asynchrony(Output):
             "asynchrony_max", (), "degree", "largest asynchrony up to the deployment time",
             error_bar=ErrorBar("largest asynchrony", safety=1.8),
             summary=("largest asynchrony", "10.4f"), worse="larger", largest_of="asynchrony",
+            round_off=1e-4,  # sections that are all alike run apart by up to 5e-6 deg
         ),
         Variable("asynchrony_max_time", (), "s", "time of the largest asynchrony"),
         *(

@@ -1,4 +1,4 @@
-"""Figures of two campaigns, or two runs, beside each other."""
+"""Figures of two campaigns, or two runs, beside each other, and of a run beside measured data."""
 
 import textwrap
 from collections.abc import Iterator
@@ -13,10 +13,18 @@ from ringsim.analysis.comparison_text import differing, names_of
 from ringsim.analysis.courses import deployed, names_of_ends
 from ringsim.analysis.design import blocks, endings, population_of, scalars, values_of
 from ringsim.analysis.intervals import good, numbers, tells_of, used
-from ringsim.outputs.family import Array
+from ringsim.analysis.residuals import Residuals
+from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import legend, limits
-from ringsim.tables import estimate_text, interval_text, readable, unit_text, with_unit
+from ringsim.tables import (
+    estimate_text,
+    interval_text,
+    readable,
+    unit_behind,
+    unit_text,
+    with_unit,
+)
 
 _LOOKS = ((style.BLUE, "-"), (style.ORANGE, (0, (5, 1.5))))
 """Colour and dashes of either: dashes tell them apart in grey."""
@@ -233,3 +241,47 @@ def _over_places(values: xr.DataArray, name: str) -> xr.DataArray:
     """The mean, or the largest, of a quantity over its planes, sections and so on."""
     places = [dim for dim in values.dims if dim not in ("sample", "time")]
     return getattr(values, _COURSES[name][0])(places) if places else values
+
+
+# Measured data over the curves of a run.
+
+
+_MOST_SENSORS = 12
+"""Sensors that are drawn: those that fit worst."""
+
+
+@style.styled
+def measured_and_computed(found: list[Residuals], title: str) -> Figure:
+    """A row a sensor: readings over the run's curve on the left, and on the right the readings less
+    the curve in standard deviations of a reading, with a band of two.
+
+    Numbers without a time are left out, and so are sensors beyond twelve: those that fit best.
+    """
+    over_time = [each for each in found if len(each.times) and np.isfinite(each.times).all()]
+    shown = sorted(over_time, key=lambda each: -np.mean(each.in_deviations**2))[:_MOST_SENSORS]
+    figure = Figure(figsize=(9.6, 1.8 * max(1, len(shown)) + 1.0))
+    rows = figure.subplots(max(1, len(shown)), 2, sharex=True, squeeze=False)
+    for (left, right), each in zip(rows, shown, strict=False):
+        variable = VARIABLES[each.readings.sensor.variable]
+        left.plot(each.times, each.measured, ".", color=style.VERMILLION, markersize=3.0,
+                  label="measured", rasterized=len(each.times) > 2000)  # fmt: skip
+        left.plot(each.times, each.computed, color=style.BLUE, linewidth=1.3, label="computed")
+        left.set_title(each.readings.sensor.name, fontsize=9.5)
+        left.set_ylabel(unit_behind("", variable.units).strip(" ()"), fontsize=9)
+        right.axhspan(-2.0, 2.0, color=style.SKY, alpha=0.35, linewidth=0.0)
+        right.axhline(0.0, color=style.GREY, linewidth=0.9)
+        right.plot(each.times, each.in_deviations, ".", color=style.INK, markersize=2.5,
+                   rasterized=len(each.times) > 2000)  # fmt: skip
+        rms = float(np.sqrt(np.mean(each.in_deviations**2)))
+        right.set_title(f"rms {rms:.3g} sigma", fontsize=9.5)
+        right.set_ylabel("sigma", fontsize=9)
+    for axes in rows[-1]:
+        axes.set_xlabel("Time (s)")
+    if not shown:
+        rows[0][0].text(0.0, 0.5, "no reading over time lies within the run")
+    else:
+        rows[0][0].legend(loc="best", fontsize=8)
+    left_out = len(over_time) - len(shown)
+    more = f" ({left_out} sensors that fit better are not drawn)" * bool(left_out)
+    style.title(figure, f"Measured and computed: {title}{more}")
+    return figure

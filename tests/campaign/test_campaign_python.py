@@ -24,8 +24,8 @@ from campaign_bench import comparable
 from ringsim import Campaign, CampaignError, InputError, open_campaign
 from ringsim.campaign.specification import SOLVERS
 from ringsim.cli import cli
-from ringsim.exit_codes import EXIT_BAD_INPUT
 from ringsim.plots import figures
+from ringsim.refusal import EXIT_BAD_INPUT
 from ringsim.sampling.distributions import Uniform
 from ringsim.storage.netcdf import locked
 

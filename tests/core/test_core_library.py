@@ -19,7 +19,6 @@ from ringsim.core import library
 from ringsim.core.library import call
 from ringsim.core.tension import Drums, RopeTable, Spans
 from ringsim.core.turning import Seen
-from ringsim.exit_codes import EXIT_BAD_INPUT
 from ringsim.frame import elimination
 from ringsim.frame.cables import Arms, Laws, Lines, Roped
 from ringsim.frame.elimination import Border, Fronts
@@ -29,7 +28,7 @@ from ringsim.frame.model import FrameModel, System
 from ringsim.frame.rods import Pose, Strains
 from ringsim.frame.springs import Web
 from ringsim.frame.state import Coefficients, Followed, Held, Moving
-from ringsim.refusal import NotBuiltError
+from ringsim.refusal import EXIT_BAD_INPUT, NotBuiltError
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 

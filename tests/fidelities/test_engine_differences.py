@@ -89,6 +89,15 @@ def test_the_last_line_says_whether_bars_cover_the_differences() -> None:
         "the engines differ by no more than their error bars in the 1 of 2 outputs that have "
         "error bars"
     )
+    # Sections that are all alike run apart by round-off, which no bar covers.
+    alike = campaign(
+        deployment_time_checked=[10.01, 11.02, NAN, NAN],
+        asynchrony_max=[5e-6, 4e-6, 0.0, 0.0], asynchrony_max_checked=[2e-9, 3e-9, NAN, NAN],
+        asynchrony_max_error=[1e-9] * 4, asynchrony_max_error_checked=[1e-9] * 4,
+    )  # fmt: skip
+    assert check_lines(alike)[-1] == "the engines differ by no more than their error bars"
+    apart = alike.assign(asynchrony_max=("sample", [2e-4, 0.0, 0.0, 0.0]))
+    assert "more than their error bars in asynchrony_max" in check_lines(apart)[-1]
     silent = campaign().drop_vars(["deployment_time_error", "deployment_time_error_checked"])
     assert "error bars in" not in check_lines(silent)[-1]
 

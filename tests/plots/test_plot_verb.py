@@ -11,8 +11,8 @@ from click.testing import CliRunner, Result
 
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.plots import figures as pictures
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 
 ROOT = Path(__file__).parents[2]
 STARTS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}

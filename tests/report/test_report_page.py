@@ -26,9 +26,9 @@ from ringsim.analysis.study_text import (
 )
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.plots import figures as of_campaigns
 from ringsim.plots.ring import lines_at
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.report import page as model
 from ringsim.report import shell, tables
 from ringsim.report.page import page

@@ -18,8 +18,7 @@ from loops import for_each
 from ringsim import load_scene, simulate
 from ringsim.cli import VERBS, cli
 from ringsim.dataset import save
-from ringsim.exit_codes import EXIT_BAD_INPUT
-from ringsim.refusal import InputError
+from ringsim.refusal import EXIT_BAD_INPUT, InputError
 
 CAMPAIGN = """name = "mine"
 scene = "truss2"

@@ -11,7 +11,7 @@ from loops import for_each
 
 from bad_scenes import BAD_SCENES, Bad
 from ringsim.cli import cli
-from ringsim.exit_codes import EXIT_BAD_INPUT
+from ringsim.refusal import EXIT_BAD_INPUT
 
 
 def check(*arguments: str) -> Result:
