@@ -194,8 +194,10 @@ def _outputs(found: xr.Dataset) -> Table:
 
 
 def _percent(first: float, second: float) -> str:
-    """The difference in percent of the first, where both have a sign in common."""
-    if not first * second > NOTHING**2:
+    """The difference in percent of the first; of what may be below zero, as a margin, it would tell
+    nothing.
+    """
+    if not min(first, second) > NOTHING:
         return "-"
     percent = 100.0 * (second - first) / abs(first)
     return f"{percent:+.3g}" if abs(percent) < _FRACTIONS else f"{percent:+.0f}"

@@ -43,6 +43,7 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
     within = places_in(analysis)
     rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
+    lonely = False
     named = set[str]()
     for output in _correlated(analysis):
         plain, partial = (
@@ -64,7 +65,9 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
             )
             for k in chosen
         ]  # fmt: skip
-        if np.isnan(partial[0][chosen]).any():
+        some = np.isnan(partial[0][chosen])
+        lonely |= bool(some.any() and not some.all())
+        if some.all() and len(chosen):
             alike = [str(names[k]) for k in chosen if np.isnan(plain[0][k])]
             alone = np.nanmax(np.abs(plain[0][chosen])) > _ALONE
             why = "one input determines the ranks" if alone else (
@@ -72,6 +75,11 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
             )  # fmt: skip
             why = f"{alike[0]} is the same in all these samples" if alike else why
             lacking.append(f"{output} ({counted(used, 'sample')} used: {why})")
+    if lonely:
+        notes.append(
+            "partial: effect of one input with the others removed; none for single places, of "
+            "which there are too many for so few samples"
+        )
     if lacking:
         notes.append(
             "no partial correlation (effect of one input with the others removed): "
@@ -403,8 +411,9 @@ def what_matters(analysis: xr.Dataset) -> Table:
 
 def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]]:
     """For each output, and then each kind of failure with an index, the inputs (or groups) that
-    matter beyond chance, by their index or else by the rank correlation that holds the others, the
-    larger index first; and the inputs that only go with one of them.
+    matter beyond chance, those with an index first, the larger before the smaller, then those with
+    a rank correlation that holds the others alone, the stronger first; and the inputs that only go
+    with one of them.
 
     An index tells how much of the scatter is an input's: beside a strong one a weaker input has no
     more of it than chance gives, however certain it is.  Its rank correlation shows it.
@@ -418,9 +427,6 @@ def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]
             values, listed = standing_out(analysis, output, _samples(analysis, output))
             order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
             ranked = analysis["input"].values[order[listed[order]]].astype(str).tolist()
-            if output in indexed:
-                size = analysis[measure].sel(output=output).fillna(0.0).to_series().to_dict()
-                ranked.sort(key=size.__getitem__, reverse=True)
             names += [name for name in ranked if name not in names]
         names, others = _cleared(analysis, output, names)
         yield output, _apart(analysis, output, names), others

@@ -22,6 +22,7 @@ from ringsim.analysis.design import (
     kinds_of_ends,
     placement,
     population_of,
+    scalars,
 )
 from ringsim.analysis.engines import GROUPS, OUTPUTS
 from ringsim.analysis.influence import influence
@@ -43,7 +44,7 @@ from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge, stopping_lines
-from ringsim.analysis.worst import NOTE, losses, worst
+from ringsim.analysis.worst import NOTE, losses, one_at_a_time, other_than_base, worst
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml, read_text
 from ringsim.parts.solver import NO_DEVIATIONS
@@ -129,7 +130,9 @@ def analyse(
     found["part"].attrs = about("share of the completed samples, counted from the first")
     stand = population_of(campaign)
     found = found.assign(statistics(stand, placed)).assign(tail(campaign)).assign(balance(campaign))
-    more = [outcomes(stand, placed), matter := influence(stand, wanted, placed)]
+    single = one_at_a_time(campaign)  # what each change does is told case by case
+    matter = xr.Dataset() if single else influence(stand, wanted, placed)
+    more = [outcomes(stand, placed), matter, *([cases(campaign)] if single else [])]
     more += [worst(stand, wanted, matter)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]
@@ -141,6 +144,29 @@ def analyse(
         for name in _bent(found):
             found[name].attrs[NOTE] = note
     return found
+
+
+def cases(campaign: xr.Dataset) -> xr.Dataset:
+    """Of a design that changes one input at a time, along ``case``: the sample, what is other than
+    in the base case, how it ended, and the main numbers, ``case_NAME``.
+    """
+    held = np.flatnonzero(ran(campaign))
+    named = scalars(campaign)
+    about_cases = {
+        "case_sample": (campaign["sample"].to_numpy()[held], "sample"),
+        "case_change": (
+            np.array([other_than_base(campaign, k) for k in held.tolist()], dtype=object),
+            "what is other than in the base case",
+        ),
+        "case_outcome": (endings(campaign)[held].astype(object), "how the sample ended"),
+    }
+    found = {name: ("case", values, {"long_name": says})
+             for name, (values, says) in about_cases.items()}  # fmt: skip
+    ok = good(campaign)[held]
+    for name in named:
+        values = np.where(ok, numbers(campaign, name)[held], np.nan)
+        found[f"case_{name}"] = ("case", values, dict(campaign[name].attrs))
+    return xr.Dataset(found)
 
 
 def _bent(found: xr.Dataset) -> list[str]:

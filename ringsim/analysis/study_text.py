@@ -45,6 +45,7 @@ from ringsim.tables import (
     number_text,
     readable,
     slim,
+    unit_behind,
     unit_text,
 )
 
@@ -161,6 +162,8 @@ def sections(
     tells it at length is left out, which takes most of the time.
     """
     short = [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
+    if "case" in analysis.dims:
+        short = [case_table(analysis)]
     more = _at_length(analysis) if full else {}
     found = (
         Section("tail", "Rare event", [tail_table(analysis)]),
@@ -187,6 +190,24 @@ def sections(
         for each in found
         if (tables := [slim(t) for t in each.tables if t.rows or t.notes])
     }
+
+
+def case_table(analysis: xr.Dataset) -> Table:
+    """Of a design that changes one input at a time a row a case, the base case first."""
+    names = [str(name) for name in analysis if f"{name}".startswith("case_")][3:]
+    units = [unit_of(analysis, name) for name in names]
+    rows = [
+        (
+            str(int(one["case_sample"])), str(one["case_change"].item()),
+            str(one["case_outcome"].item()),
+            *(number_text(factor * float(one[name]))
+              for name, (factor, _) in zip(names, units, strict=True)),
+        )
+        for one in (analysis.isel(case=k) for k in range(analysis.sizes["case"]))
+    ]  # fmt: skip
+    heads = [unit_behind(n.removeprefix("case_"), unit or "1")
+             for n, (_, unit) in zip(names, units, strict=True)]  # fmt: skip
+    return Table(("sample", "other than the base case", "outcome", *heads), rows, left=3)
 
 
 def _at_length(analysis: xr.Dataset) -> dict[str, list[Table]]:
@@ -266,12 +287,16 @@ def not_met(analysis: xr.Dataset) -> list[str]:
 
 def verdict_table(analysis: xr.Dataset) -> Table:
     """The verdicts, a row a requirement; no rows without requirements."""
-    rows, notes = [], [_DECIDES] * bool(analysis.sizes.get("requirement"))
+    rows, notes, chosen = [], list[str](), False
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         variables = analysis.sel(requirement=name).variables
         one = {str(n): v.values.item() for n, v in variables.items() if not v.dims}
         verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
         further = one["further_samples"]
+        bad, used = one["samples_violating"], one["samples_used"]
+        if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
+            one["probability"], chosen = np.nan, True
+            notes.append(f"{name}: {bad} of {used} cases violate it")
         rows.append((
             one["requirement_text"], f"{one['probability_required']:g}",
             f"{one['confidence_required']:g}", verdict.words, number_text(one["probability"]),
@@ -283,10 +308,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             more = counted(further, "further sample")
             taken = counted(one["samples_lost"], "failed run")
             kept = f" (if the {taken} are counted as violations)" * bool(one["samples_lost"])
-            bad, used = one["samples_violating"], one["samples_used"]
             so_far = f"{bad} of {used} violate it so far; " * bool(bad)
             notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
-        if bad := one["samples_violating"]:
+        if bad and verdict != Verdict.NO_POPULATION:
             share, low, high = (
                 number_text(1.0 - one[f"probability{end}"]) for end in ("", "_upper", "_lower")
             )
@@ -312,6 +336,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             notes.append(
                 f"{name}: violations without a value (the antenna did not get that far): {missing}"
             )
+    if rows:
+        notes.insert(0, _CHOSEN if chosen else _DECIDES)
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
         "verdict", "estimate", _BOUND, "samples used", "violating", "failed runs",
@@ -325,6 +351,9 @@ _DECIDES = (
     "the one-sided bound, at the confidence required, decides each verdict; where neither the "
     "lower nor the upper bound decides, both are given"
 )
+
+
+_CHOSEN = "cases were chosen and not drawn: there is no probability to estimate"
 
 
 def _decisive(verdict: Verdict, low: float, high: float) -> str:

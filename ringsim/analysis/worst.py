@@ -18,6 +18,7 @@ from ringsim.analysis.design import (
     inputs,
     kinds_of_ends,
     place_names,
+    placement,
     short_of_goal,
 )
 from ringsim.analysis.indices import UNLIKELY, dependence
@@ -46,7 +47,7 @@ _ROUND_OFF = 1e-9
 """Distance from the median, over the largest value, that is none."""
 _ZERO = 273.15
 """0 C in K."""
-NOTE_ON_UNUSUAL = (
+_NOTE_ON_UNUSUAL = (
     "unusual inputs: first those that separate the failures from the other samples, or that go "
     "with the output, then those outside the central 90 % of all samples; in brackets the "
     "difference from the median, for temperatures the value in C"
@@ -75,7 +76,11 @@ def unusual(
 
     Of an input with m places the one that is farthest out among all values counts, with m times
     the share: some place of every sample is far out by chance.  Its mean counts beside.
+
+    Of a design that changes one input at a time what is other than in its base case.
     """
+    if one_at_a_time(campaign):
+        return [other_than_base(campaign, place) for place in places]
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     variables = {k: v for k, v in variables.items() if v.attrs.get("path") != "solver.error_bars"}
     columns, found = drawn(campaign), list[str]()
@@ -102,6 +107,33 @@ def unusual(
         told += [each.words for each in sorted(odd, key=lambda each: (not each.before, each.share))]
         found.append("; ".join(told[:_MOST]) or "nothing unusual")
     return found
+
+
+def one_at_a_time(campaign: xr.Dataset) -> bool:
+    """Whether each sample differs from the first one, the base case, by one change."""
+    return bool(placement(campaign).kind == "one-at-a-time")
+
+
+def other_than_base(campaign: xr.Dataset, place: int) -> str:
+    """What a sample, by its place in the file, has other than the first one: "cables.lower.winch.
+    stop_time = 1 s (base: none)".
+    """
+    told = []
+    for variable in (campaign[name] for name in inputs(campaign)):
+        values = variable.to_numpy()
+        rows = values.reshape(len(values), -1)
+        of = [""] if values.ndim == 1 else [f"{one} of " for one in place_names(variable)]
+        for k in np.flatnonzero(rows[place] != rows[0]).tolist():
+            new, base = (_value(rows[row, k], _units(variable)) for row in (place, 0))
+            told.append(f"{of[k]}{called(variable)} = {new} (base: {base})")
+    return "; ".join(told[:_MOST]) or "the base case"
+
+
+def _value(value: Any, units: str) -> str:
+    try:
+        return with_unit(f"{float(value):.4g}", units)
+    except ValueError:
+        return str(value)
 
 
 def _has_words(variable: xr.DataArray) -> bool:
@@ -331,6 +363,11 @@ def worst_tables(analysis: xr.Dataset, folder: str) -> list[Table]:
 COLUMNS = ("failure", "failed", "of", "sample", "found", "inputs")
 
 
+def note_on_unusual(analysis: xr.Dataset) -> str:
+    """What "unusual inputs" are; empty where samples differ from a base case by one change each."""
+    return "" if "case" in analysis.dims else _NOTE_ON_UNUSUAL
+
+
 def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
     """The same for terminals."""
     lines = list[str]()
@@ -338,7 +375,7 @@ def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
         lines.append(f"worst of: {table.title}")
         for sample, value, odd, again in table.rows:
             lines += [f"  sample {sample}: {value}", f"    inputs: {odd}", f"    {again}"]
-    return [*lines, NOTE_ON_UNUSUAL] if lines else []
+    return [*lines, *filter(None, [note_on_unusual(analysis)])] if lines else []
 
 
 # Lost runs that bend what the others tell: which lines they bend, and the mark on these.

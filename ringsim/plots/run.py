@@ -209,7 +209,10 @@ def energy(dataset: xr.Dataset) -> Figure:
     lower.plot(lack["time"], factor * lack, color=style.PURPLE)
     lower.set_ylabel(f"Imbalance ({units})")
     if math.isfinite(error := float(dataset.get("energy_error", math.nan))):
-        lower.set_title(f"{style.label(dataset['energy_error'])}: {error:.1e}")
+        lower.set_title(
+            f"{style.label(dataset['energy_error'])}: {error:.1e} at the steps (the curve is "
+            "interpolated between them)"
+        )
     style.time_axes(dataset, dataset["work"], upper, lower)
     style.head(figure, upper, dataset, "Energy")
     return figure

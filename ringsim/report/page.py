@@ -13,7 +13,7 @@ from ringsim.analysis.design import campaign_file, endings, inputs, paths_of
 from ringsim.analysis.intervals import good
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import head_lines, outputs_in, sections
-from ringsim.analysis.worst import NOTE_ON_UNUSUAL
+from ringsim.analysis.worst import note_on_unusual
 from ringsim.files import write_text
 from ringsim.overrides import flat
 from ringsim.plots.comparison import figures_of_both
@@ -142,7 +142,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign),
         "first": _FIRST, "player": shown, "failures": failures, "more": more,
-        "worst_note": NOTE_ON_UNUSUAL,
+        "worst_note": note_on_unusual(analysis),
         "players": {str(sample): k for sample, k in places.items()},
         "notes": [*restart_lines(campaign), *override_lines(campaign)],
         "inputs": tables.drawn(campaign),

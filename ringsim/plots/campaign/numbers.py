@@ -27,7 +27,7 @@ from ringsim.analysis.intervals import good, numbers, quantile, ran, tells_of
 from ringsim.analysis.requirements import OUTCOME, Requirement, required_by, violations
 from ringsim.analysis.tails import approach, subset_simulation, tail
 from ringsim.analysis.verdicts import judge
-from ringsim.outputs.family import Array
+from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import (
     MOST_PANELS,
@@ -138,11 +138,11 @@ def _counts(samples: int, most: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(1, samples, min(most, samples)).astype(int))
 
 
-def running(values: Array) -> tuple[NDArray[np.int64], Array, Array]:
-    """Counts, and mean and 95 % quantile of so many first samples each."""
+def running(values: Array, level: float = 0.95) -> tuple[NDArray[np.int64], Array, Array]:
+    """Counts, and mean and a quantile of so many first samples each."""
     counts = _counts(len(values), _POINTS)
     mean = np.array([values[:n].mean() for n in counts])
-    return counts, mean, np.array([quantile(values[:n], 0.95) for n in counts])
+    return counts, mean, np.array([quantile(values[:n], level) for n in counts])
 
 
 def band(
@@ -192,7 +192,7 @@ def _met_most(campaign: xr.Dataset, wanted: Mapping[str, Requirement]) -> list[s
 
 @picture(
     "campaign", 100,
-    "Mean, 95 % quantile and probability of each requirement as samples come in",
+    "Mean, quantile at the worse end and probability of each requirement as samples come in",
     applies=_converges,
 )  # fmt: skip
 def convergence(campaign: xr.Dataset) -> Figure:
@@ -219,15 +219,17 @@ def convergence(campaign: xr.Dataset) -> Figure:
     figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3)
     for axes, name in zip(panels, names, strict=False):
         samples, values = values_of(campaign, name)
-        counts, mean, upper = running(values)
+        # The end that an engineer fears.
+        level = 0.05 if VARIABLES[name].badness < 0 else 0.95
+        counts, mean, far = running(values, level)
         known, ends = band(values, samples, placed)
         if len(known):
             axes.fill_between(known, *ends.T, color=style.SKY, alpha=0.3, linewidth=0.0,
                               label="95 % interval of the mean")  # fmt: skip
         size = 2.5 if len(counts) < 50 else 0.0
         axes.plot(counts, mean, color=style.BLUE, label="mean", marker="o", markersize=size)
-        axes.plot(counts, upper, color=style.VERMILLION, linestyle="dashed", marker="s",
-                  markersize=size, label="95 % quantile")  # fmt: skip
+        axes.plot(counts, far, color=style.VERMILLION, linestyle="dashed", marker="s",
+                  markersize=size, label=f"{level:.0%} quantile".replace("%", " %"))  # fmt: skip
         axes.ticklabel_format(axis="y", useOffset=False)
         _named(axes, style.label(campaign[name], width=42), len(values))
     for axes, (name, each) in zip(panels[len(names) :], wanted.items(), strict=True):

@@ -233,7 +233,10 @@ def tornado(campaign: xr.Dataset) -> Figure:
     beyond = any(np.isfinite(bars.chance) for _, bars in found)
     of = f"The longest {_MOST} bars at most{', significant inputs only' * beyond}."
     if any((np.abs(bars.values) < bars.chance).any() for _, bars in found):
-        of += " Where an index ends before the dashed line, the rank correlation is significant."
+        of += (
+            " Where an index ends before the dashed line, the partial rank correlation is "
+            "significant."
+        )
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", whiskers, of]))
     if quiet:
         caption += f" No significant input for {', '.join(quiet)}."
