@@ -146,6 +146,9 @@ class Locks(Remembering):
         count = f"{int(self.deployed.sum())} of {self.deployed.size} V-joints {word}"
         if not open_ or len(open_) == self.deployed.size:
             return count
+        none = np.flatnonzero(~self.deployed.any(axis=1)).tolist()
+        if len(none) == 1 and self.deployed.sum() == self.deployed.size - self.deployed.shape[1]:
+            return f"{count}, none of the {self._planes[none[0]]} plane"
         more = f" and {len(open_) - _NAMED} more" if len(open_) > _NAMED else ""
         return f"{count}, not {', '.join(open_[:_NAMED])}{more}"
 

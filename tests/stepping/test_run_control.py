@@ -375,6 +375,11 @@ def test_a_rope_that_no_rope_would_survive_ends_a_sound_run() -> None:
             "came to rest with 0 of 6 V-joints locked: no winch turns, and within 3 s",
         ),
         (2, Fate.PARTLY_DEPLOYED, "came to rest with 4 of 6 V-joints locked, not lower 2, lower 3"),
+        (
+            3,
+            Fate.PARTLY_DEPLOYED,
+            "came to rest with 3 of 6 V-joints locked, none of the lower plane:",
+        ),
     ],
 )
 def test_what_rests_before_its_goal_ends_at_once(left: int, fate: Fate, words: str) -> None:
