@@ -209,10 +209,8 @@ def energy(dataset: xr.Dataset) -> Figure:
     lower.plot(lack["time"], factor * lack, color=style.PURPLE)
     lower.set_ylabel(f"Imbalance ({units})")
     if math.isfinite(error := float(dataset.get("energy_error", math.nan))):
-        lower.set_title(
-            f"{style.label(dataset['energy_error'])}: {error:.1e} at the steps (the curve is "
-            "interpolated between them)"
-        )
+        # The curve is of outputs, which lie between steps and are interpolated.
+        lower.set_title(f"{style.label(dataset['energy_error'])}: {error:.1e} (at the steps)")
     style.time_axes(dataset, dataset["work"], upper, lower)
     style.head(figure, upper, dataset, "Energy")
     return figure
