@@ -103,14 +103,14 @@ class FrameModel:
         if not isinstance(scene.rods, GeometricallyExactRods):
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         drawn = layout_of(scene)
-        if drawn.contacts:
-            raise InputError(f"{NOT_HERE} contacts of bodies: {CURE}")
         self.scene = scene
         self.layout, self.prestress = assembled(drawn, scene.rods)
         self.ideal = OneCoordinate(scene, drawn)
         self.gravity = np.zeros(3) if self.layout.gravity is None else self.layout.gravity
         self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)
         self.skeleton = skeleton = Skeleton(self.layout)
+        if self.layout.contacts:
+            raise InputError(f"{NOT_HERE} contacts of bodies: {CURE}")
         beam = self.layout.boom
         boom = [] if beam is None else skeleton.add_beam(beam)
         touching = [] if beam is None else [beam.low.body]
