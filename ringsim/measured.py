@@ -94,9 +94,9 @@ class Sensor(Model):
                 "table, or the one value that was read)"
             )
         variable = VARIABLES.get(self.variable)
-        if variable is None:
+        if variable is None or variable.dtype == "str":
             hint = known_or_nearest(self.variable, VARIABLES)
-            raise ValueError(f"variable = {show(self.variable)} is none of a run ({hint})")
+            raise ValueError(f"variable = {show(self.variable)} is no number of a run ({hint})")
         known = _UNITS.get(variable.units, {variable.units: 1.0})
         if self.unit not in known:
             raise ValueError(
@@ -199,7 +199,8 @@ def load_measured(path: str | Path) -> Measurement:
         file = Measured.model_validate(parse_toml(read_text(path), path.name))
     except ValidationError as error:
         raise InputError(explain(error, Measured, path.name)) from None
-    columns = _table(file, path.parent / file.file) if file.file else {}
+    asks = any(sensor.column for sensor in file.sensors)
+    columns = _table(file, path.parent / file.file) if asks else {}
     return Measurement(file, tuple(_read(file, sensor, columns) for sensor in file.sensors))
 
 
@@ -208,7 +209,9 @@ def _read(file: Measured, sensor: Sensor, columns: dict[str, Array]) -> Readings
     if sensor.value is not None or file.clock is None:
         value = sensor.scale * ((sensor.value or 0.0) - sensor.bias)
         if VARIABLES[sensor.variable].units == "s" and file.clock is not None:
-            value = file.clock.offset + (1.0 + file.clock.drift) * value
+            # A duration, as of a slack rope, has no place in time.
+            instant = sensor.variable.endswith("_time")
+            value = file.clock.offset * instant + (1.0 + file.clock.drift) * value
         return Readings(sensor, np.full(1, np.nan), np.array([value]), deviation, 0, 0)
     clock = file.clock
     scale = _UNITS["s"][clock.unit]
@@ -232,7 +235,10 @@ def _table(file: Measured, path: Path) -> dict[str, Array]:
     if len(lines) < 2:
         raise InputError(f"{path.name}: has no readings: give a row of heads, and rows below it")
     separator = max(_SEPARATORS, key=lines[0].count)
-    head, *rows = csv.reader(io.StringIO("\n".join(lines)), delimiter=separator)
+    try:
+        head, *rows = csv.reader(io.StringIO("\n".join(lines)), delimiter=separator)
+    except csv.Error as error:
+        raise InputError(f"{path.name}: is no table: {error}: write it as plain CSV") from None
     head = [cell.strip() for cell in head]
     wanted = dict.fromkeys([file.clock.column, *(s.column for s in file.sensors if s.column)])
     for name in wanted:

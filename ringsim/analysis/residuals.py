@@ -20,9 +20,11 @@ class Residuals:
     times: Array
     """s, shape (n,)."""
     measured: Array
+    """In the variable's units, shape (n,)."""
     computed: Array
+    """The same of the run."""
     outside: int
-    """Readings before the first or after the last value of the run."""
+    """Readings before the first or after the last value of the run, or of what it never came to."""
 
     @property
     def apart(self) -> Array:
@@ -66,7 +68,11 @@ def _of(run: xr.Dataset, readings: Readings) -> Residuals:
             raise InputError(f"sensor {sensor.name}: the run has no {dim} {show(label)} ({hint})")
         found = found.sel({dim: label})
     if "time" not in found.dims:
-        return Residuals(readings, readings.times, readings.values, np.full(1, float(found)), 0)
+        value = np.full(1, float(found))
+        there = np.isfinite(value)  # a ring that stalls has no deployment time
+        return Residuals(
+            readings, readings.times[there], readings.values[there], value[there], int(~there[0])
+        )
     known = np.isfinite(found.values)
     times, values = found["time"].values[known], found.values[known]
     at = readings.times

@@ -194,7 +194,8 @@ def sections(
 
 def case_table(analysis: xr.Dataset) -> Table:
     """Of a design that changes one input at a time a row a case, the base case first."""
-    names = [str(name) for name in analysis if f"{name}".startswith("case_")][3:]
+    told = "case_sample", "case_change", "case_outcome"
+    names = [str(name) for name in analysis if str(name).startswith("case_") and name not in told]
     units = [unit_of(analysis, name) for name in names]
     rows = [
         (
@@ -296,7 +297,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         bad, used = one["samples_violating"], one["samples_used"]
         if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
             one["probability"], chosen = np.nan, True
-            notes.append(f"{name}: {bad} of {used} cases violate it")
+            notes.append(f"{name}: {bad} of {used} samples violate it")
         rows.append((
             one["requirement_text"], f"{one['probability_required']:g}",
             f"{one['confidence_required']:g}", verdict.words, number_text(one["probability"]),
@@ -353,7 +354,7 @@ _DECIDES = (
 )
 
 
-_CHOSEN = "cases were chosen and not drawn: there is no probability to estimate"
+_CHOSEN = "these samples stand for no population: there is no probability to estimate"
 
 
 def _decisive(verdict: Verdict, low: float, high: float) -> str:

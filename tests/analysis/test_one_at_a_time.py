@@ -53,7 +53,7 @@ def test_failures_tell_what_is_other_and_nothing_speaks_of_chance(campaign: xr.D
     for word in ("nothing unusual", "chance", "significant", "estimate  ", "probability of"):
         assert word not in text, word
     bad = int((campaign["asynchrony_max"] > 11.5).sum())
-    assert f"asynchrony_max: {bad} of 6 cases violate it" in lines
-    assert "cases were chosen and not drawn: there is no probability to estimate" in lines
+    assert f"asynchrony_max: {bad} of 6 samples violate it" in lines
+    assert "these samples stand for no population: there is no probability to estimate" in lines
     drawn = told(analyse(campaign.assign_attrs(design='{"kind": "random"}'), LIMIT))
-    assert not any("cases" in line for line in drawn)
+    assert not any("population" in line for line in drawn)

@@ -129,6 +129,28 @@ def test_each_number_of_the_table_follows_from_the_readings(
     assert found.rows[0][0] == "lock_time upper 1"  # the worst first
 
 
+def test_a_duration_is_not_shifted_by_the_offset_of_the_clock(
+    run: xr.Dataset, tmp_path: Path
+) -> None:
+    slack = LOCK.replace("lock_time", "longest_slack").replace("value = 34.0", "value = 2.0")
+    slack = slack.replace('place = { plane = "upper", section = 1 }', "")
+    (one,) = load_measured(written(tmp_path, HEAD + slack, table(run)[:3])).readings
+    assert one.values == pytest.approx([1.001 * 2.0])
+    # Without a table, too; the clock need not be there.
+    alone = 'name = "x"\nfile = "none.csv"\n' + slack
+    (one,) = load_measured(written(tmp_path, alone, [])).readings
+    assert one.values == pytest.approx([2.0])
+
+
+def test_what_a_run_never_came_to_is_not_compared(run: xr.Dataset, tmp_path: Path) -> None:
+    file = load_measured(written(tmp_path, HEAD + LOCK + ENCODER, table(run)))
+    lock, encoder = residuals(run.assign(lock_time=run["lock_time"] * np.nan), file)
+    assert (len(lock.apart), lock.outside) == (0, 1)
+    found = residual_statistics([lock, encoder])
+    assert np.isfinite(found.attrs["rms_in_deviations"])
+    assert residual_table([lock, encoder]).rows[-1][0] == "lock_time upper 1"
+
+
 def test_gaps_between_readings_are_counted(run: xr.Dataset, tmp_path: Path) -> None:
     rows = table(run)
     file = written(tmp_path, HEAD + ENCODER, rows[:20] + rows[40:])
@@ -143,6 +165,7 @@ def test_gaps_between_readings_are_counted(run: xr.Dataset, tmp_path: Path) -> N
 WRONG_FILES = {
     "unknown variable": (ENCODER.replace("opening_angle", "opening_angel"),
                          "did you mean opening_angle"),
+    "words": (ENCODER.replace("opening_angle", "peak_tension_plane"), "no number of a run"),
     "unit of another kind": (ENCODER.replace('"rad"', '"N"'), 'unit = "N" is none for'),
     "no place": (ENCODER.replace('place = { plane = "upper", section = 2 }', ""),
                  "place = { plane = ..., section = ... }"),

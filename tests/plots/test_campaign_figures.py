@@ -311,6 +311,18 @@ def test_of_blocks_figures_show_the_samples_that_the_analysis_takes() -> None:
     assert "16 of 16 samples; no run failed. Only the samples A and B" in words(figure)
 
 
+def test_convergence_draws_the_quantile_at_the_worse_end() -> None:
+    made = with_motors(made_campaign(8))
+    figure = convergence(made)
+    for name, level, label in (
+        ("least_drive_margin", 0.05, "5 % quantile"), ("peak_tension", 0.95, "95 % quantile"),
+    ):  # fmt: skip
+        own = style.plain(made[name].attrs["long_name"])[:12].lower()
+        (axes,) = (a for a in figure.axes if a.get_title(loc="left").lower().startswith(own))
+        (line,) = (each for each in axes.lines if each.get_label() == label)
+        assert line.get_ydata()[-1] == pytest.approx(np.quantile(made[name], level))
+
+
 def test_one_at_a_time_names_every_change() -> None:
     campaign = made_campaign(6, stalled=(5,))
     campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
