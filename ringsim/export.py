@@ -15,7 +15,6 @@ from ringsim.layout.bodies import Array
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
 from ringsim.shapes import ByLine, Shape, shape_of
-from ringsim.tables import unit_text
 
 # Codes and units of variables in words.
 
@@ -37,7 +36,8 @@ def in_words(variable: xr.DataArray) -> xr.DataArray:
 
 def units_of(variable: xr.DataArray) -> str:
     """Unit of a variable; empty of words and of numbers without one."""
-    return unit_text(str(variable.attrs.get("units", "1")))
+    units = str(variable.attrs.get("units", "1"))
+    return "" if units == "1" else units
 
 
 def meaning_of(variable: xr.DataArray) -> str:

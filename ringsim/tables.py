@@ -141,8 +141,12 @@ def chance_text(probability: float) -> str:
 
 
 def unit_text(units: str) -> str:
-    """A unit as a cell of a table has it: empty of numbers without one."""
-    return "" if units == "1" else units
+    """A unit as people read it, empty of numbers without one; files name it as CF does.
+
+    >>> unit_text("degree"), unit_text("degree s-1"), unit_text("1")
+    ('deg', 'deg s-1', '')
+    """
+    return "" if units == "1" else units.replace("degree", "deg")
 
 
 def readable(units: str, largest: float) -> tuple[float, str]:
@@ -174,4 +178,4 @@ def with_unit(number: str, units: str) -> str:
 
 def unit_behind(words: str, units: str) -> str:
     """What a number is, and its unit: "tension (N)"."""
-    return words if units == "1" else f"{words} ({units})"
+    return words if units == "1" else f"{words} ({unit_text(units)})"

@@ -163,9 +163,8 @@ def _of_others(sound: xr.Dataset, variable: Variable) -> tuple[float, str]:
     if (name := f"{variable.name}_error") not in sound or not sound[name].notnull().any():
         return np.nan, ""
     stated = sound[name].dropna("sample")
-    units = "deg" if variable.units == "degree" else variable.units
     largest = float(stated.max())
-    most = with_unit(f"{largest:.2g}", units)
+    most = with_unit(f"{largest:.2g}", variable.units)
     return largest, (
         f"; this sample has no error bar, the {counted(stated.size, 'sample')} that have one are "
         f"within {most}"

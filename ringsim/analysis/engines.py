@@ -9,10 +9,18 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import placement, population_of
-from ringsim.analysis.intervals import CHECKED, Mask, good, is_moment, numbers, quantities
+from ringsim.analysis.intervals import (
+    CHECKED,
+    ROUND_OFF,
+    Mask,
+    good,
+    is_moment,
+    numbers,
+    quantities,
+)
 from ringsim.analysis.ladder import Rung, references
 from ringsim.outputs.family import VARIABLES, Array
-from ringsim.tables import counted, text_table
+from ringsim.tables import counted, text_table, unit_text
 from ringsim.variables import GOALS, Fate, Outcome, Status
 
 _NOT_CHECKED = -1
@@ -48,8 +56,8 @@ class Difference:
 
     @property
     def listed(self) -> bool:
-        """Whether tables tell of it: sizes that differ at all."""
-        return not is_moment(self.name) and bool(self.apart.any())
+        """Whether tables tell of it: sizes that differ by more than rounding."""
+        return not is_moment(self.name) and bool((self.share > ROUND_OFF).any())
 
 
 def differences(campaign: xr.Dataset) -> list[Difference]:
@@ -100,7 +108,8 @@ def check_lines(campaign: xr.Dataset) -> list[str]:
         lines.append(f"median and worst are over the {both} that both engines completed")
     rows = [
         (
-            each.name, each.units, f"{np.median(each.apart):.2g}", f"{each.apart[each.worst]:.2g}",
+            each.name, unit_text(each.units),
+            f"{np.median(each.apart):.2g}", f"{each.apart[each.worst]:.2g}",
             str(each.samples[each.worst]), f"{each.share[each.worst]:.2g}",
             _or_dash(each.bars[each.worst]), _or_dash(each.standard_error),
         )

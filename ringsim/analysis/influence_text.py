@@ -172,6 +172,8 @@ def _with_interval(middle: Array, ends: Array, k: int) -> tuple[str, str]:
 
 _MOST = 5
 """Groups or inputs that are told for each output."""
+_TELLING = 5
+"""Samples without a value from which on their inputs can be told from those of the others."""
 _MOST_PLACES = 3
 _SLACK = 0.05
 """How far Sobol' indices may lie above what is possible before that is told."""
@@ -261,10 +263,10 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
                 f"representative: {', '.join(cures)}, or narrow the inputs"
             )
         else:
-            yield (
-                f"{who}: {counted(count, 'sample')} without a value{blocks} left out; this does "
-                f"not seem to depend on any input ({p})"
-            )
+            why = f"this does not seem to depend on any input ({p})"
+            if count < _TELLING:
+                why = "too few to tell whether that depends on an input"
+            yield f"{who}: {counted(count, 'sample')} without a value{blocks} left out; {why}"
 
 
 def sensitivity_tables(analysis: xr.Dataset) -> list[Table]:

@@ -55,7 +55,7 @@ def quantile(values: Array, probability: float | Sequence[float]) -> Array:
 NOTHING = 1e-12
 """Size in SI units below which a number is what rounding leaves: that of numbers of order one,
 1e-16, after some thousand operations.  Nothing that a ring's outputs are told in is so small."""
-_ROUND_OFF = 1e-9
+ROUND_OFF = 1e-9
 """Range over the largest value below which values differ by rounding alone: steps are found to no
 more digits."""
 
@@ -70,7 +70,7 @@ def all_alike(least: Array | float, most: Array | float) -> Any:
     """
     largest = np.maximum(np.abs(least), np.abs(most))
     with np.errstate(invalid="ignore"):  # of infinite ones
-        near = np.subtract(most, least) <= _ROUND_OFF * largest
+        near = np.subtract(most, least) <= ROUND_OFF * largest
     return np.equal(least, most) | near | (largest < NOTHING)
 
 

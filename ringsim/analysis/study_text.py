@@ -448,9 +448,13 @@ def unit_of(analysis: xr.Dataset, name: str) -> tuple[float, str]:
 
 
 def digits_of(least: float, most: float) -> int:
-    """So many digits that a range has four of its own."""
+    """Four, or so many that a narrow range has two of its own.
+
+    >>> digits_of(22.19, 33.5), digits_of(4.99623, 4.99725)
+    (4, 5)
+    """
     larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
-    return max(4, int(np.log10(larger)) + 4)
+    return max(4, int(np.log10(larger)) + 2)
 
 
 def every_statistic(analysis: xr.Dataset) -> Table:

@@ -328,9 +328,9 @@ def tail_table(analysis: xr.Dataset) -> Table:
     if (checked or outside) and not why:
         apart = analysis["tail_difference"]
         farther, nearer = analysis["tail_probability_moved"].to_numpy()
+        moved = with_unit(f"{float(apart):.2g}", apart.attrs["units"])
         rows.append((
-            f"probability with the limit moved by {float(apart):.2g} {apart.attrs['units']} "
-            "(difference of the engines)",
+            f"probability with the limit moved by {moved} (difference of the engines)",
             f"{farther:.3g} to {nearer:.3g}",
         ))  # fmt: skip
     notes = why[1:] or unseen_lines(analysis)

@@ -23,7 +23,7 @@ from ringsim.analysis.design import (
 )
 from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.influence import separating, standing_out
-from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, ran
+from ringsim.analysis.intervals import ROUND_OFF, Mask, good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
 from ringsim.stepping.instant import Array
@@ -43,8 +43,6 @@ _SIDE = 1 / 3
 """
 _MOST = 3
 """Inputs that are told of a sample."""
-_ROUND_OFF = 1e-9
-"""Distance from the median, over the largest value, that is none."""
 _ZERO = 273.15
 """0 C in K."""
 _NOTE_ON_UNUSUAL = (
@@ -171,7 +169,7 @@ def _odd(variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
     ):
         rows = each.reshape(len(each), -1)
         apart = np.abs(rows[sample] - np.median(rows))
-        if apart.max() <= _ROUND_OFF * np.abs(rows).max():
+        if apart.max() <= ROUND_OFF * np.abs(rows).max():
             continue
         below = np.array([np.mean(rows < value) for value in rows[sample]])
         above = np.array([np.mean(rows > value) for value in rows[sample]])

@@ -30,6 +30,7 @@ from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.balance import rules
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, InputError, show
 from ringsim.storage.result import Result, check_of
+from ringsim.tables import unit_text
 from ringsim.variables import GOALS, TIMINGS, Outcome
 
 
@@ -258,7 +259,7 @@ def judged(different: list[str], new: Arrays, old: Arrays, bars: Arrays) -> list
         sizes[name] = float(np.nanmax(apart) / largest) if largest else np.inf
         if name in bars:
             told = f"{name} by {np.nanmax(apart):.2g} of {np.nanmax(bars[name]):.2g}"
-            unit = VARIABLES[name].units
+            unit = unit_text(VARIABLES[name].units)
             (beyond if np.any(apart > bars[name]) else within).append(f"{told} {unit}")
     lines = []
     if sizes:

@@ -33,7 +33,7 @@ from ringsim.rigid.margin import (
 )
 from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
 from ringsim.scene.substituted import strained, substituted
-from ringsim.tables import counted, text_table
+from ringsim.tables import counted, text_table, unit_text
 from ringsim.units import Model
 from ringsim.variables import Variable
 
@@ -412,7 +412,7 @@ def explain_command(names: tuple[str, ...], schema: str | None) -> None:
 def explained(variable: Variable) -> str:
     """One line: name and dimensions, units, meaning, codes, and which scenes have it."""
     text = f"{variable.name}({', '.join(variable.dims)})"
-    text = f"{text:44s} {variable.units:8s} {variable.long_name}"
+    text = f"{text:44s} {unit_text(variable.units) or '1':8s} {variable.long_name}"
     if variable.flags is not None:
         text += ": " + ", ".join(f"{int(code)} {code.word}" for code in variable.flags)
     return text + (f" (only with {', '.join(variable.needs)})" if variable.needs else "")

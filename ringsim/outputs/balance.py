@@ -20,7 +20,7 @@ from ringsim.outputs.family import (
 )
 from ringsim.scene import Scene
 from ringsim.stepping.instant import exchanged
-from ringsim.tables import known_to, readable
+from ringsim.tables import known_to, readable, unit_text
 from ringsim.variables import TIMINGS, Cause, Fate, Outcome, Status
 
 # Energies over time, and what their balance lacks.
@@ -126,7 +126,7 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             bar = factor * np.asarray(values.get(f"{variable.name}_error", np.nan)).item()
             text = f"{number:{variable.summary[1]}}"
             text = known_to(text, bar, exact=number).strip().rjust(len(text))
-            text += {"degree": " deg", "1": ""}.get(unit, f" {unit}")
+            text = f"{text} {unit_text(unit)}".rstrip()
             if np.isfinite(bar):  # samples of a campaign need not have one
                 text += f" +- {bar:.2g}"
             found[variable.name] = f"{text} {output().told(values, span_names)}".rstrip()

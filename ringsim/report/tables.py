@@ -19,7 +19,7 @@ from ringsim.analysis.design import (
     law_text,
     paths_of,
 )
-from ringsim.tables import number_text
+from ringsim.tables import number_text, unit_text
 from ringsim.variables import Cause
 
 MOST_FAILURES = 100
@@ -82,7 +82,7 @@ def drawn(campaign: xr.Dataset) -> Rows:
         else:
             extent = " to ".join(number_text(end, 5) for end in (values.min(), values.max()))
         places = variable.shape[1] if variable.ndim > 1 else 1
-        unit = str(variable.attrs.get("units", "-"))
+        unit = unit_text(str(variable.attrs.get("units", "-")))
         paths = ", ".join(paths_of(variable))
         rows.append([called(variable), unit, str(places), law, extent, paths])
     return rows

@@ -178,7 +178,7 @@ def test_shares_of_outcomes_and_of_requirements_differ_by_an_interval():
     other = np.where(np.arange(COUNT) % 8 == 0, Fate.STALLED, Fate.DEPLOYED)
     told = {"requirements": json.dumps(REQUIRED)}
     one, two = seeded(VALUES).assign_attrs(told), seeded(SHIFTED, outcome=other).assign_attrs(told)
-    found = compare(one, two).sel(kind="stalled", requirement="asynchrony_max <= 1.5 degree")
+    found = compare(one, two).sel(kind="stalled", requirement="asynchrony_max <= 1.5 deg")
     assert found.kind_share.values.tolist() == [0.0, 0.125]
     expected = difference_of_pairs(0, 0, COUNT // 8, COUNT - COUNT // 8)
     assert found.kind_share_difference_interval.values == pytest.approx(expected)
@@ -245,7 +245,7 @@ def test_two_runs_are_compared(tmp_path):
     assert done.exit_code == 0
     assert xr.load_dataset(arguments[2]).asynchrony_max_difference.item() == 0.5
     line = next(line for line in done.output.splitlines() if line.startswith("asynchrony_max"))
-    assert line.split() == ["asynchrony_max", "degree", "2", "2.5", "0.5", "+25", "b"]
+    assert line.split() == ["asynchrony_max", "deg", "2", "2.5", "0.5", "+25", "b"]
 
 
 def test_a_run_and_a_campaign_are_not_compared(tmp_path):

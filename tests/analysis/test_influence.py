@@ -179,7 +179,7 @@ def test_what_separates_failures_stalls_and_violations_is_found():
     assert areas["failed runs", "force"] == 1.0
     assert areas["stalled", "force"] == 0.0
     assert areas["stalled", "stop = 3.0"] == 1.0
-    assert areas["violates asynchrony_max <= 0.8 degree", "other"] == 1.0
+    assert areas["violates asynchrony_max <= 0.8 deg", "other"] == 1.0
     low, high = found.separation_interval.sel(group="stalled", input="other").values
     assert low < 0.5 < high
     (line,) = (line for line in told(found, full=True) if line.startswith("stalled: force"))
@@ -214,6 +214,6 @@ def test_what_the_same_samples_are_is_told_once_and_verdicts_come_last() -> None
     wanted = {"outcome": {"is": "deployed"} | share, "asynchrony_max": {"max": 2.0} | share}
     found = analyse(made, wanted)
     assert found["group"].values.tolist() == [
-        "stalled; violates outcome is deployed; violates asynchrony_max <= 2 degree"
+        "stalled; violates outcome is deployed; violates asynchrony_max <= 2 deg"
     ]
     assert told(found)[-1].startswith("asynchrony_max: violations without a value")

@@ -66,7 +66,7 @@ def test_wrong_requirements_are_told_with_the_cure(table, words):
         (["outcome: is deployed", "outcome: is folded"], "given twice"),
         (["latch_rate[upper,2]: max 3"], r"latch_rate\[upper,2\]: .*its largest, peak_latch_rate"),
         (["peak_tension[1]: max 3"], r"peak_tension\[1\]: a sample has one value: leave out \[1\]"),
-        (["asynchrony_max: max 10 rad, probability 0.9"], "max = 10 rad: give it in degree"),
+        (["asynchrony_max: max 10 rad, probability 0.9"], "max = 10 rad: give it in deg"),
     ],
 )
 def test_wrong_texts_are_told_with_an_example(texts, words):

@@ -167,7 +167,7 @@ def test_requirements_of_the_file_are_judged_and_outcomes_are():
     assert found.requirement.values.tolist() == ["asynchrony_max", "outcome"]
     assert verdict(found, "outcome") == Verdict.MET
     assert found.requirement_text.values.tolist() == [
-        "asynchrony_max <= 10 degree", "outcome is deployed"
+        "asynchrony_max <= 10 deg", "outcome is deployed"
     ]  # fmt: skip
 
 

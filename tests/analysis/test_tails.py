@@ -44,11 +44,11 @@ def test_an_event_that_is_not_reached_is_bounded_and_never_told_as_zero(above, s
     high = found.tail_reached_probability_interval.values[1]
     assert norm.sf(above) < high < 0.5
     table = tail_table(found)
-    assert table.head[1] == f"asynchrony_max > {above:g} degree"
+    assert table.head[1] == f"asynchrony_max > {above:g} deg"
     told_of = dict(table.rows)["probability"]
     assert told_of == f"below {high:.2g}: {short} of 4 replicates did not reach the event"
     assert (
-        f"the run nearest to the event has {made.asynchrony_max.values.max():.6g} degree"
+        f"the run nearest to the event has {made.asynchrony_max.values.max():.6g} deg"
     ) in table.notes
     assert {*table.notes, table.lines()[0]} <= {*told(found)}
 

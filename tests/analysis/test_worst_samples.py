@@ -48,19 +48,19 @@ def found(**requirements: dict[str, float]) -> dict[str, list[tuple[int, str]]]:
 
 def test_each_failure_has_its_worst_samples_in_order() -> None:
     rows = found(asynchrony_max={"max": 6.0}, least_drive_margin={"min": 0.2})
-    degree = "violates asynchrony_max <= 6 degree"
+    degree = "violates asynchrony_max <= 6 deg"
     assert rows == {
-        degree: [(2, "9 degree"), (5, "8 degree"), (4, "7 degree")],
+        degree: [(2, "9 deg"), (5, "8 deg"), (4, "7 deg")],
         "violates least_drive_margin >= 0.2": [(1, "-0.25"), (6, "-0.15"), (0, "0.15")],
         "stalled": [(3, "ended so")],
         "failed: diverged": [(7, "ended so")],
     }
     # Without a value it is violated, too, and comes after those that tell by how much.
-    assert found(asynchrony_max={"max": 8.5})["violates asynchrony_max <= 8.5 degree"] == [
-        (2, "9 degree"), (3, "no value: ended so"),
+    assert found(asynchrony_max={"max": 8.5})["violates asynchrony_max <= 8.5 deg"] == [
+        (2, "9 deg"), (3, "no value: ended so"),
     ]  # fmt: skip
     both = found(asynchrony_max={"min": 1.5, "max": 8.9})
-    assert [s for s, _ in both["violates asynchrony_max <= 8.9 degree and >= 1.5 degree"]] == [
+    assert [s for s, _ in both["violates asynchrony_max <= 8.9 deg and >= 1.5 deg"]] == [
         1, 2, 3,
     ]  # fmt: skip
 
@@ -200,7 +200,7 @@ def test_analysis_and_accessor_tell_the_same_and_how_to_run_them() -> None:
     assert table["replay"][0] == "ringsim replay runs/made 7"
     lines = told(known, "here/my runs")
     at = lines.index(worst_lines(known, "here/my runs")[0])
-    assert lines[at] == "worst of: violates asynchrony_max <= 3 degree (5 of 8 samples)"
+    assert lines[at] == "worst of: violates asynchrony_max <= 3 deg (5 of 8 samples)"
     assert lines[at + 3] == "    ringsim replay 'here/my runs' 7"
     one.attrs["requirements"] = json.dumps({})
     assert len(made_campaign(3, kind="grid").assign_attrs(requirements="{}").ring.worst()) == 0

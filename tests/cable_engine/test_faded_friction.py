@@ -49,6 +49,22 @@ def test_both_cables_take_one_clause_behind_the_reason_of_the_run() -> None:
     assert len(remark) < 160
 
 
+def test_friction_that_is_mostly_smoothed_away_is_told_as_such() -> None:
+    """At a thousandth of the slip speed hardly any of the friction is left."""
+    crawl = {"kind": "constant", "speed": 1e-6}
+    heavy = {"kind": "bearing", "coefficient": 0.003}
+    values = {"both__winch__winding": crawl, "both__friction": heavy, "both__slip_speed": 2e-4}
+    reason = run_frame(slowly(**values)).reason
+    much = (
+        "; much of the pulley friction is smoothed away, so that the ring opens too easily, tension"
+    )
+    assert much in reason
+    share = float(reason.partition("tension up to ")[2].partition(" %")[0])
+    # Ten pulleys of f / R = 0.3 keep at least exp(-0.3) of the tension each where ropes turn by
+    # 180 deg: what is too high lies below exp(3) - 1, and far above what is merely rounded.
+    assert 30.0 < share < 1900.0
+
+
 def test_silence_where_friction_acts_or_where_there_is_none() -> None:
     for values in (
         {},

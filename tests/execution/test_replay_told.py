@@ -26,7 +26,7 @@ def test_the_largest_relative_difference_is_named() -> None:
     new["opening_angle"][0, 0, 2] = 130.0
     lines = judged(["latch_rate", "opening_angle"], new, OLD, BARS)
     assert lines[0] == "largest relative difference: 0.02 (latch_rate)"
-    assert lines[1] == "below the error bars: opening_angle by 0.12 of 0.2 degree"
+    assert lines[1] == "below the error bars: opening_angle by 0.12 of 0.2 deg"
 
 
 def test_what_exceeds_its_bar_is_named_alone() -> None:

@@ -76,7 +76,7 @@ def test_the_summary_of_a_run_states_it(opening_rate, tmp_path) -> None:
         cli, ["run", "truss2", "--fidelity=frame", "--out", out, *settings]
     )
     with xr.open_dataset(out) as found:
-        line = f"  largest opening rate{float(found.opening_rate_max):10.4f} degree s-1"
+        line = f"  largest opening rate{float(found.opening_rate_max):10.4f} deg s-1"
     assert line in printed.output.splitlines()
 
 

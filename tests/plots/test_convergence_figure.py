@@ -115,7 +115,7 @@ def test_a_requirement_has_its_probability_with_the_bounds_of_its_verdict() -> N
         drawn_at = ends_at(axes, count)
         np.testing.assert_allclose(drawn_at[[0, -1]], sides)
     titles = [a.get_title(loc="left") for a in figure.axes]
-    assert "asynchrony_max <= 3 degree\nn = 29" in titles
+    assert "asynchrony_max <= 3 deg\nn = 29" in titles
 
 
 def test_requirements_that_fail_are_drawn_and_what_is_left_out_has_its_reason() -> None:

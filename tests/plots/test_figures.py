@@ -73,8 +73,8 @@ def drawn(deployed: xr.Dataset, failed: xr.Dataset) -> Drawn:
 @pytest.mark.parametrize(
     ("draw", "name", "label"),
     [
-        (opening_angles, "opening_angle", "Some name (degree)"),
-        (asynchrony, "asynchrony", "Some name (degree)"),
+        (opening_angles, "opening_angle", "Some name (deg)"),
+        (asynchrony, "asynchrony", "Some name (deg)"),
         (rod_stress, "rod_stress", "Some name (MPa)"),
         (energy, "work", "some name"),
         (section_map, None, None),

@@ -142,7 +142,7 @@ def test_what_is_over_counts_on_in_the_courses(both: tuple[xr.Dataset, xr.Datase
     (figure,) = (figure for name, _, figure in figures_of_both(found, one, both[1])
                  if name == "courses")  # fmt: skip
     drawn = {" ".join(a.get_ylabel().split()): a.lines[0].get_xydata() for a in figure.axes}
-    time, opening = drawn["Mean opening angle (degree)"].T
+    time, opening = drawn["Mean opening angle (deg)"].T
     assert opening[time > 6.0] == pytest.approx(180.0)
     time, tension = drawn["Largest cable tension (N)"].T
     held = tensions.max(axis=(1, 2))[..., ~late][:, -1]
@@ -276,7 +276,7 @@ def test_distributions_and_requirements_that_differ_are_told(
         r"input stop.stiffness +uniform, low 40, high 60 +uniform, low 40, high 80", lines
     )
     assert re.search(
-        r"requirement asynchrony_max +<= 5 degree, probability 0.9, confidence 0.95 +none", lines
+        r"requirement asynchrony_max +<= 5 deg, probability 0.9, confidence 0.95 +none", lines
     )
     assert "input stop.stiffness" not in "\n".join(
         compared(compare(one, asked(both[1], 60.0, 4.0)))

@@ -239,10 +239,10 @@ def test_the_player_offers_median_worst_and_failures() -> None:
     data = shown(made_campaign(8, **KINDS["mixed"]))
     assert data is not None
     assert [each["name"] for each in data["samples"]] == [
-        "sample 3: median by asynchrony_max, violates asynchrony_max <= 3 degree, deployed",
-        "sample 6: worst by asynchrony_max, violates asynchrony_max <= 3 degree, deployed",
+        "sample 3: median by asynchrony_max, violates asynchrony_max <= 3 deg, deployed",
+        "sample 6: worst by asynchrony_max, violates asynchrony_max <= 3 deg, deployed",
         "sample 4: violates deployment_time <= 40 s, violates outcome is deployed, "
-        "violates asynchrony_max <= 3 degree, stalled",
+        "violates asynchrony_max <= 3 deg, stalled",
         "sample 2: failed: timeout", "sample 5: failed: timeout",
     ]  # fmt: skip
     assert len(data["samples"][0]["times"]) == len(TIMES)
@@ -363,6 +363,10 @@ def test_what_matters_is_that_of_the_analysis() -> None:
         ["asynchrony_max by force", "0.75", "0.65 .. 0.85", "0.6", "0.5 .. 0.7", "7", "1"],
         ["asynchrony_max by rods", "0.25", "0.15 .. 0.35", "0.2", "0.1 .. 0.3", "7", "1"],
     ]  # fmt: skip
+    assert "2 samples without a value" in gate.notes[0]
+    assert "too few to tell whether that depends on an input" in gate.notes[0]
+    analysis["missing"] = "output", [5]
+    gate = sensitivity_tables(analysis)[1]
     assert "this does not seem to depend on any input (p = 0.4)" in gate.notes[0]
 
 

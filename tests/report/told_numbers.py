@@ -122,7 +122,9 @@ class File:
                 name: np.ma.filled(v[:].astype(float), np.nan) for name, v in file.variables.items()
                 if v.dimensions == ("sample",) and v.dtype is not str and v.dtype.kind in "fi"
             }  # fmt: skip
-            self.units = {name: getattr(v, "units", "") for name, v in file.variables.items()}
+            told = {"degree": "deg"}  # as CF writes it, and as people do
+            units = {name: getattr(v, "units", "") for name, v in file.variables.items()}
+            self.units = {name: told.get(unit, unit) for name, unit in units.items()}
             self.words = {name: getattr(v, "long_name", "") for name, v in file.variables.items()}
             self.inputs = {}
             for name, v in file.variables.items():
