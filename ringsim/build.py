@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent
 AROUND = (
-    "__main__.py", "accessor.py", "analysis", "calibration.py", "campaign", "cli", "execution",
+    "__main__.py", "accessor.py", "analysis", "campaign", "cli", "execution",
     "export.py", "measured.py", "plots", "reference", "report", "sampling", "storage",
 )  # fmt: skip
 """What plans and reads results and never makes them: no part of the sources' digest, so that a

@@ -1,4 +1,4 @@
-"""``ringsim accuracy`` and ``stability``."""
+"""``ringsim accuracy``, ``stability`` and ``calibrate``."""
 
 import os
 from collections.abc import Sequence
@@ -156,3 +156,30 @@ def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float
     for name in ("stability.nc", "stability.png", "stability.md"):
         click.echo(f"wrote {folder / name}")
     return EXIT_FAILED if (whole["verdict"] == WRONG).any() else EXIT_DONE
+
+
+@click.command()
+@click.argument("file", metavar="FILE", type=PATH)
+@SETTINGS
+@click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME).")
+@click.option("--workers", metavar="N", type=WORKERS, help="Solver processes (default: all cores).")
+def calibrate_command(
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None
+) -> int:
+    """Find unknown inputs from measured data: FILE has priors, the data and a budget of runs.
+
+    FILE is a campaign file without a design, with measured = "TEST.toml", runs and stages.  Writes
+    posterior.nc, whose samples a campaign draws from (design.kind = "posterior"); each stage is a
+    campaign in the same folder.  The same command goes on with one that was interrupted.
+    """
+    from ringsim.analysis.posterior import calibration_tables
+    from ringsim.campaign.calibration import POSTERIOR, calibrate, load_calibration
+
+    given = load_calibration(file, settings)
+    folder = out or Path("runs") / given.campaign.specification.name
+    found = calibrate(given, folder, workers or len(os.sched_getaffinity(0)))
+    for table in calibration_tables(found):
+        for line in ["", *table.lines()]:
+            click.echo(line)
+    click.echo(f"wrote {folder / POSTERIOR}")
+    return EXIT_DONE

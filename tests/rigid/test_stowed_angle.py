@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 from loops import for_each
 
-from ringsim.calibration import opening_angle_for
+from ringsim.campaign.calibration import opening_angle_for
 from ringsim.cli import cli
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import OneCoordinate, opening_time
