@@ -284,7 +284,9 @@ def test_energies_are_drawn_in_the_unit_of_the_label(drawn, deployed):
     assert "2.3e-05" in lower.get_title(loc="left")
 
 
-@pytest.mark.parametrize(("sections", "closed"), [(1, False), (6, True), (72, True)])
+@pytest.mark.parametrize(
+    ("sections", "closed"), [(1, False), pytest.param(6, True, marks=pytest.mark.slow), (72, True)]
+)
 def test_no_words_leave_the_sheet_or_meet(sections, closed, scene_of, made_run):
     run = made_run(scene_of(sections, closed=closed))
     for draw in DRAWINGS:
