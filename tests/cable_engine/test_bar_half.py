@@ -28,7 +28,7 @@ def scene(half: str = "first", **values: Any) -> Scene:
 
 @cache
 def opened(half: str, engine: str) -> Outcome:
-    return outcome(scene(half), engine)
+    return outcome(scene(half, solver__tolerance=1e-3), engine)
 
 
 @pytest.mark.parametrize("end", ["first", "last", "both"])
