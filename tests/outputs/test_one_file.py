@@ -49,7 +49,7 @@ def opening_rate(monkeypatch):
 
 @pytest.mark.parametrize(("fidelity", "end", "gained"), [("frame", 2.0, 5.0), ("full", 0.5, 1.0)])
 def test_a_run_has_it(opening_rate, fidelity, end, gained) -> None:
-    short = {"record.interval": 0.01, "solver.end_time": end}
+    short = {"record.interval": 0.01, "solver.end_time": end, "solver.tolerance": 1e-3}
     found = simulate(SCENE.with_values(short), fidelity)
     assert found.opening_rate.dims == ("time",)
     assert found.opening_rate.attrs["units"] == "degree s-1"
