@@ -35,7 +35,7 @@ def drive(kind: str = "ancf", **values: Any) -> CableDrive:
 def disturbed(own: CableDrive, seed: int, by: float = 1e-2) -> tuple[Array, Array]:
     """Any coordinates near the reference and any rates, by node: joints need not hold."""
     rng, mask = np.random.default_rng(seed), own.path.spots >= 0
-    moved = own._reference + by * rng.normal(size=mask.shape) * mask
+    moved = own.reference + by * rng.normal(size=mask.shape) * mask
     turned = np.flatnonzero(mask.sum(axis=1) == 7)
     moved[turned, 3:7] /= np.linalg.norm(moved[turned, 3:7], axis=1)[:, None]
     rates = 0.1 * rng.normal(size=mask.shape) * mask
@@ -58,7 +58,7 @@ def halves(own: CableDrive) -> NDArray[np.int64]:
 def test_points_are_those_of_rods_with_orientations() -> None:
     slopes, turns = drive(), drive("geometrically-exact")
     assert len(halves(slopes)) == 12
-    one, other = (d.evaluate(d._reference, 0.0 * d._reference, 0.0)[1] for d in (slopes, turns))
+    one, other = (d.evaluate(d.reference, 0.0 * d.reference, 0.0)[1] for d in (slopes, turns))
     assert one.points == pytest.approx(other.points, abs=1e-14)
 
 

@@ -40,7 +40,7 @@ motors = {f"cables.{plane}.winch.winding": winding for plane in ("upper", "lower
 drive = DriveMargin(scene.with_values(motors), EcssMechanisms())
 at = drive.at(1.5)
 now = drive.mechanism.at(0.5 * (math.pi - 1.5))
-over = drive._drive.reeved(now)[0].shortening.tolist()
+over = drive.drive.reeved(now)[0].shortening.tolist()
 told["margin"] = {"pulleys": at.resisting[PULLEYS], "shortening": over}
 print(json.dumps(told))
 """

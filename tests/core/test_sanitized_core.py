@@ -27,7 +27,7 @@ import sys
 from pathlib import Path
 import numpy as np
 from ringsim.core import library
-library._files = lambda name: [Path(sys.argv[1])]
+library.files_of = lambda name: [Path(sys.argv[1])]
 one = np.ones(9)
 """
 RUN = """
@@ -67,7 +67,7 @@ def sanitized(tmp_path_factory: pytest.TempPathFactory) -> Run:
     if not runtime("libasan.so"):
         pytest.skip("there is no gcc with sanitizers")
     built = tmp_path_factory.mktemp("sanitized") / "_core.so"
-    made, sources = f'-DSOURCES="{library._digest()}"', sorted(library._FOLDER.glob("*.c"))
+    made, sources = f'-DSOURCES="{library.digest()}"', sorted(library.FOLDER.glob("*.c"))
     subprocess.run([str(GCC), *FLAGS, made, *sources, "-o", built, "-lm"], check=True)
     environment = os.environ | {
         "LD_PRELOAD": f"{runtime('libasan.so')}:{runtime('libubsan.so')}",
