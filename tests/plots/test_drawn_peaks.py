@@ -33,7 +33,7 @@ def truss() -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def planar() -> xr.Dataset:
-    fields = {"solver.end_time": 0.5, "record.interval": 0.1}
+    fields = {"solver.end_time": 0.2, "record.interval": 0.1}
     return simulate(load_scene("planar-truss").with_values(fields))
 
 
