@@ -108,10 +108,10 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     lines = [Line2D([], [], color=style.GREY, linewidth=1.8, label="median")]
     if one is not None:
         lines += [Line2D([], [], label=f"worst: sample {worst}", **_WORST)]
-    handles = [*words, *bands, *lines]
+    handles: list[Line2D | Patch] = [*words, *bands, *lines]
     if cases:
         alike = {look["label"]: look for look, _ in cases}
-        handles = [Line2D([], [], **look) for look in alike.values()] + lines[1:]
+        handles = [*(Line2D([], [], **look) for look in alike.values()), *lines[1:]]
     entries(figure, handles, [str(each.get_label()) for each in handles])
     note = "After its end a deployed ring counts as in step, any other keeps its last deviation."
     if cases:

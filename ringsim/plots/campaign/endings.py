@@ -25,7 +25,7 @@ from ringsim.plots.campaign.frame import (
     looks_of_cases,
     of_cases,
 )
-from ringsim.plots.drives_and_locks import least_rate
+from ringsim.plots.drives_and_locks import least_rate, standard_of
 from ringsim.plots.registry import picture
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
@@ -149,7 +149,7 @@ def margin(campaign: xr.Dataset) -> Figure:
     grid = angle_grid(rows)
     laid = np.array([laid_on(grid, *row) for row in rows])
     bands_by_ending(lower, grid, laid, words, looks_of_cases(campaign, read["sample"].values))
-    style.margin_axis(lower, np.append(laid, values.min()), "Margin of the drive")
+    style.margin_axis(lower, np.append(laid, values.min()), f"Margin by {standard_of(campaign)}")
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
     lower.set_xlabel("Mean opening angle (degree)")
     legend(figure, [lower], 4)
