@@ -284,4 +284,5 @@ def measured_and_computed(found: list[Residuals], title: str) -> Figure:
     left_out = len(over_time) - len(shown)
     more = f" ({left_out} sensors that fit better are not drawn)" * bool(left_out)
     style.title(figure, f"Measured and computed: {title}{more}")
+    style.in_readable_units(figure)
     return figure

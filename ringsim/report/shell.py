@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 
 from ringsim.files import whole, writing
-from ringsim.plots.style import HEAVY, Inline
+from ringsim.plots.style import HEAVY, Inline, in_deg
 from ringsim.refusal import InputError
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def written(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    shell.filters["sentence"] = _sentence
+    shell.filters |= {"sentence": _sentence, "deg": in_deg}
     shape, text = shell.get_template(template), ""
     each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
@@ -54,6 +54,7 @@ def _sentence(line: str) -> str:
     """A line of a terminal as a sentence: with a capital, unless a name begins it."""
     first = line.split(maxsplit=1)[0] if line else ""
     named = not first.isalpha() or first != first.lower()
+    line = in_deg(line)
     return f"{line if named else line[0].upper() + line[1:]}."
 
 
