@@ -186,7 +186,7 @@ def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
 
 
 def in_readable_units(figure: Figure) -> None:
-    """Let the axes and words of a figure of SI values give stress and angles as people read them."""
+    """Let the axes and words of a figure give stress, in SI, and angles as people read them."""
     for axes, side in product(figure.axes, ("x", "y")):
         axis: Axis = getattr(axes, f"{side}axis")
         beside = getattr(figure, f"get_sup{side}label")()

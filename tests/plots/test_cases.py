@@ -133,3 +133,10 @@ def test_the_player_offers_the_base_case() -> None:
     names = [each["name"] for each in held["samples"]]
     assert names[0].startswith("sample 0: base case")
     assert not [each for each in names if "median" in each]
+
+
+def test_angles_have_one_unit_in_all_figures() -> None:
+    for one in (single_changes(5), with_motors(made_campaign(8))):
+        told = {each.name: words(figure) for each, figure in figures_of(one)}
+        assert "(deg)" in told["fan"]
+        assert not [name for name, text in told.items() if "degree" in text]

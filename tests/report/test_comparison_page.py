@@ -19,6 +19,7 @@ from ringsim.analysis.intervals import good
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots.comparison import figures_of_both, pairs, values
+from ringsim.plots.style import in_deg
 from ringsim.report.page import comparison_page
 from ringsim.report.shell import LARGEST
 from ringsim.variables import Fate
@@ -46,6 +47,7 @@ def test_the_page_holds_every_cell_of_the_terminal_and_loads_nothing(
     assert len(read.ids) == len(set(read.ids))
     assert all(load.startswith(("#", "data:image/png;base64,")) for load in read.loads)
     cells = [c for s in sections(found).values() for t in s.tables for r in t.rows for c in r]
+    cells = [in_deg(cell) for cell in cells]
     assert sorted(cells) == sorted(c for c in read.cells if c in cells)
     assert {"figure-differences", "figure-values", "figure-courses"} <= set(read.ids)
     assert "What differs: flight against ground" in text
@@ -142,7 +144,7 @@ def test_what_is_over_counts_on_in_the_courses(both: tuple[xr.Dataset, xr.Datase
     (figure,) = (figure for name, _, figure in figures_of_both(found, one, both[1])
                  if name == "courses")  # fmt: skip
     drawn = {" ".join(a.get_ylabel().split()): a.lines[0].get_xydata() for a in figure.axes}
-    time, opening = drawn["Mean opening angle (degree)"].T
+    time, opening = drawn["Mean opening angle (deg)"].T
     assert opening[time > 6.0] == pytest.approx(180.0)
     time, tension = drawn["Largest cable tension (N)"].T
     held = tensions.max(axis=(1, 2))[..., ~late][:, -1]

@@ -28,6 +28,7 @@ from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots import figures as of_campaigns
 from ringsim.plots.ring import lines_at
+from ringsim.plots.style import in_deg
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.report import page as model
 from ringsim.report import shell, tables
@@ -239,10 +240,10 @@ def test_the_player_offers_median_worst_and_failures() -> None:
     data = shown(made_campaign(8, **KINDS["mixed"]))
     assert data is not None
     assert [each["name"] for each in data["samples"]] == [
-        "sample 3: median by asynchrony_max, violates asynchrony_max <= 3 degree, deployed",
-        "sample 6: worst by asynchrony_max, violates asynchrony_max <= 3 degree, deployed",
+        "sample 3: median by asynchrony_max, violates asynchrony_max <= 3 deg, deployed",
+        "sample 6: worst by asynchrony_max, violates asynchrony_max <= 3 deg, deployed",
         "sample 4: violates deployment_time <= 40 s, violates outcome is deployed, "
-        "violates asynchrony_max <= 3 degree, stalled",
+        "violates asynchrony_max <= 3 deg, stalled",
         "sample 2: failed: timeout", "sample 5: failed: timeout",
     ]  # fmt: skip
     assert len(data["samples"][0]["times"]) == len(TIMES)
@@ -433,7 +434,9 @@ def test_pages_terminals_and_python_tell_the_same_tables() -> None:
     assert every[0].keys() == campaign.ring.tables().keys()
     for table in every[0].values():
         for row in table.to_numpy().tolist():
-            at = [k for k, cell in enumerate(cells) if cell == row[0]]
-            assert any(cells[k : k + len(row)] == row for k in at), row
+            deg = [in_deg(cell) for cell in row]
+            at = [k for k, cell in enumerate(cells) if cell == deg[0]]
+            assert any(cells[k : k + len(row)] == deg for k in at), row
             assert any(all(cell in line for cell in row) for line in lines) or len(row) == 4, row
+    assert not [cell for cell in cells if "degree" in cell]
     assert "statistic" in every[1]["output"]
