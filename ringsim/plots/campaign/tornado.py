@@ -330,7 +330,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     names, ends = scalars(campaign), endings(campaign)
     words, moved = moves(campaign)
     samples, has_run = campaign["sample"].to_numpy(), ran(campaign)
-    figure = Figure(figsize=(9.6, 1.75 * len(names) + 2.4))
+    figure = Figure(figsize=(9.6, 1.4 * len(names) + 2.4))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     looks = looks_of(ends)
     for axes, name in zip(panels, names, strict=True):
