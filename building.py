@@ -37,17 +37,18 @@ def get_requires_for_build_editable(settings: Any = None) -> list[str]:
 
 def build_wheel(folder: str, settings: Any = None, metadata: str | None = None) -> str:
     """A wheel in a folder; its name."""
-    _choose_compiler()
+    choose_compiler()
     return str(build_meta.build_wheel(folder, settings, metadata))
 
 
 def build_editable(folder: str, settings: Any = None, metadata: str | None = None) -> str:
     """A wheel that leads to the checkout, with the core compiled there; its name."""
-    _choose_compiler()
+    choose_compiler()
     return str(build_meta.build_editable(folder, settings, metadata))
 
 
-def _choose_compiler() -> None:
+def choose_compiler() -> None:
+    """Have setuptools compile with what ``COMPILER`` brings where there is no other compiler."""
     if not has_compiler():
         # For any processor of this kind, as others compile; Zig's default is this one alone.
         compiler = f"{shlex.quote(sys.executable)} -m ziglang cc -mcpu=baseline"

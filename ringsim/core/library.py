@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from ringsim.refusal import NotBuiltError
 
-_FOLDER = Path(__file__).parent / "c"
+FOLDER = Path(__file__).parent / "c"
+"""Sources of the core, and where it is compiled to."""
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
 ASKED = ctypes.CFUNCTYPE(_WHOLE, _WHOLE)
 """What the core may ask Python: a function of a whole number that returns 0, or 1 to stop it."""
@@ -72,62 +73,62 @@ _TYPES: dict[str, list[Any]] = {
 }  # fmt: skip
 _KINDS = {NDArray[np.float64]: "a", NDArray[np.int64]: "n", float: "r", int: "w", bool: "w"}
 """The same of fields of tables, by their annotations."""
-_MOST_KNOWN = 64
+MOST_KNOWN = 64
 """Packed tables that are kept at most."""
 
 
 @cache
 def _function(name: str) -> tuple[str, Any]:
     takes, returns = _FUNCTIONS[name]
-    found = getattr(_library(), name)
+    found = getattr(loaded(), name)
     found.argtypes = [each for letter in takes for each in _TYPES[letter]]
     found.restype = returns
     return takes, found
 
 
 @cache
-def _library() -> ctypes.PyDLL:
+def loaded() -> ctypes.PyDLL:
     """That for this processor.  It keeps Python's lock: nothing else runs meanwhile."""
     whys = ["is not compiled here"]
-    for name in ("_wide", "_core") if _has_wide_registers() else ("_core",):
-        for file in _files(name):
+    for name in ("_wide", "_core") if has_wide_registers() else ("_core",):
+        for file in files_of(name):
             try:
                 found = ctypes.PyDLL(str(file))
             except OSError as error:  # of another machine that shares the folder
                 whys.append(f"cannot be loaded ({error})")
                 continue
             found.compiled_from.restype = ctypes.c_char_p
-            if found.compiled_from().decode() == _digest():
+            if found.compiled_from().decode() == digest():
                 return found
             whys.append("was compiled from other sources")
     raise NotBuiltError(
-        f"{_FOLDER}: the compiled core of ringsim {whys[-1]}: run pip install . (developers: pip "
+        f"{FOLDER}: the compiled core of ringsim {whys[-1]}: run pip install . (developers: pip "
         "install -e . after each change of the C sources)"
     )
 
 
-def _files(name: str) -> list[Path]:
+def files_of(name: str) -> list[Path]:
     """The libraries of a name, the youngest first; a checkout may hold some for other versions of
     Python, and one that is not compiled takes what is installed of the same sources: Python finds
     the package of the folder that it is started in before the one that is installed.
     """
     # Of several: building leaves one in the checkout that says nothing of the installed one.
     installed = [each.locate_file("ringsim/core/c") for each in distributions(name="ringsim")]
-    folders = dict.fromkeys([_FOLDER, *(Path(str(each)) for each in installed)])
+    folders = dict.fromkeys([FOLDER, *(Path(str(each)) for each in installed)])
     return [
         file for folder in folders
         for file in sorted(folder.glob(f"{name}.*so"), key=lambda file: -file.stat().st_mtime)
     ]  # fmt: skip
 
 
-def _digest() -> str:
+def digest() -> str:
     """Of the sources, as setup.py takes it."""
-    files = sorted([*_FOLDER.glob("*.c"), *_FOLDER.glob("*.h")])
+    files = sorted([*FOLDER.glob("*.c"), *FOLDER.glob("*.h")])
     whole = b"".join(file.read_bytes() for file in files)
     return hashlib.blake2b(whole, digest_size=8).hexdigest()
 
 
-def _has_wide_registers() -> bool:
+def has_wide_registers() -> bool:
     """Whether the processor takes four numbers at once (AVX2); results are the same without."""
     if platform.machine() not in ("x86_64", "AMD64"):
         return False
@@ -187,7 +188,7 @@ _known: dict[int, _Packed] = {}
 def _packed(table: Any) -> _Packed:
     found = _known.get(id(table))
     if found is None:
-        if len(_known) >= _MOST_KNOWN:
+        if len(_known) >= MOST_KNOWN:
             _known.clear()
         words = np.array(_words(table), dtype=np.int64)
         found = _known[id(table)] = _Packed(table, words, _address(words, "n"))

@@ -150,6 +150,11 @@ class Slot:
         self.busy = False
         self._begin = self._deadline = self._look = 0.0
 
+    @property
+    def pid(self) -> int:
+        """The number of its process, 0 while it has none."""
+        return 0 if self._process is None else self._process.pid
+
     def suits(self, work: Work) -> bool:
         """Whether it is set up for the runs of this work."""
         return tuple(self._setup.values()) == (work.solver, work.scene, work.allowance, work.judge)

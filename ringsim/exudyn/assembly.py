@@ -95,11 +95,14 @@ _RATE = exu.OutputVariableType.AngularVelocityLocal
 
 
 class DryJoints:
-    """The joints of a model whose friction is not proportional to their rates."""
+    """The joints of a model whose friction is not proportional to their rates.
+
+    ``families`` are the laws, each with its dampers' numbers in exudyn and the lines through it.
+    """
 
     def __init__(self, system: Any) -> None:
         self._system = system
-        self._families: list[tuple[JointFriction, list[Any], Turning]] = []
+        self.families: list[tuple[JointFriction, list[Any], Turning]] = []
 
     def add(self, law: JointFriction, markers: Sequence[tuple[Any, Any]]) -> None:
         """Joints between pairs of markers about their common z axis; ``law`` has values for all of
@@ -107,17 +110,17 @@ class DryJoints:
         """
         add, damper = self._system.AddObject, item.ObjectConnectorTorsionalSpringDamper
         dampers = [add(damper(markerNumbers=list(pair))) for pair in markers]
-        self._families.append((law, dampers, Turning()))
+        self.families.append((law, dampers, Turning()))
 
     def begin(self) -> None:
         """Begin an attempt at a step."""
-        for *_, turning in self._families:
+        for *_, turning in self.families:
             turning.forget()
 
     def follow(self) -> None:
         """Take the lines of all laws at the current state; due before every residual."""
         system = self._system
-        for law, dampers, turning in self._families:
+        for law, dampers, turning in self.families:
             rates = np.array([system.GetObjectOutput(damper, _RATE) for damper in dampers])
             turning.note(law, rates)
             slopes = turning.tangents(law, rates, law.torque)

@@ -177,6 +177,8 @@ class CableDrive:
         The cables with their planes, and what they run over, on the model's nodes.
     chain, ropes, winches
         See ringsim.core.chain and ringsim.cable; faults replace the ropes.
+    reference
+        Coordinates of the nodes as drawn, (nodes, width).
     refusal
         Why the chain last had no answer to a state that Newton tried; empty if it always had.
     """
@@ -192,7 +194,7 @@ class CableDrive:
             )
             for which in ("reference", "initial")
         )
-        self._reference = reference
+        self.reference = reference
         self._columns = np.concatenate([assembly.coordinates_of(node) for node in path.nodes])
         self.chain = Chain(present, path.per_cable)
         # Rods that are not as drawn have unstrained nodes as a reference, and begin elsewhere.
@@ -219,8 +221,8 @@ class CableDrive:
             item.ObjectGenericODE2(
                 nodeNumbers=[*path.nodes, auxiliary],
                 massMatrix=mass,
-                forceUserFunction=self._force,
-                jacobianUserFunction=self._jacobian,
+                forceUserFunction=self.force,
+                jacobianUserFunction=self.jacobian,
             )
         )
 
@@ -256,7 +258,7 @@ class CableDrive:
         """The chain at a state of the object; Newton asks twice for force and Jacobian."""
         size = self.path.size
         place, rates = (self.path.by_node(np.asarray(x[:size])) for x in (q, q_t))
-        place = place + self._reference
+        place = place + self.reference
         asked = (time, place.tobytes(), rates.tobytes())
         known = self._answered
         if known is None or known[0] != asked or known[1].ropes is not self.ropes:
@@ -264,7 +266,10 @@ class CableDrive:
             self._turning.note(self.ropes, known[1].speeds)
         return known[1:]
 
-    def _force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
+    def force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
+        """As exudyn asks for it at a time (s): forces on nodes and on unknowns of ropes, for
+        displacements and rates of both; NaN where the chain has no answer.
+        """
         force = np.zeros(self._size)
         own = force[: self.path.size]
         try:
@@ -277,9 +282,12 @@ class CableDrive:
             own[:] = np.nan
         return force
 
-    def _jacobian(
+    def jacobian(
         self, mbs: Any, t: float, number: int, q: Any, q_t: Any, by_q: float, by_rate: float
     ) -> Any:
+        """As exudyn asks for it: a sparse matrix, ``by_q`` and ``by_rate`` times the derivatives
+        of what cables take, after coordinates and rates.
+        """
         try:
             with np.errstate(all="ignore"):
                 state, placed = self._answer(q, q_t, t)

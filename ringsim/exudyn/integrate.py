@@ -157,7 +157,7 @@ class Integration(Run):
     def __init__(self, built: Built, watch: Watch | None = None) -> None:
         model, scene = built.model, built.model.scene
         super().__init__(scene, watch)
-        self._built, self._model, self._cables = built, model, built.cables
+        self._built, self.model, self._cables = built, model, built.cables
         self._system = model.assembly.system
         self._solver = exu.MainSolverImplicitSecondOrder()
         self._settings = solver_settings(scene, newton_norm(built))
@@ -178,7 +178,7 @@ class Integration(Run):
         )
 
     @property
-    def _state(self) -> State:
+    def state(self) -> State:
         """See ``Run``."""
         return self._now
 

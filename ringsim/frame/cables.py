@@ -186,6 +186,8 @@ class FrameCables:
     ----------
     present, winches, ropes
         As of ``ringsim.exudyn.cables.CableDrive``.
+    chain
+        The laws of the ropes, of which the core's are the same.
     lines, points
         What the paths run over; number of their points.
     laws, roped
@@ -195,15 +197,15 @@ class FrameCables:
     def __init__(self, cables: Cables, skeleton: Skeleton, mesh: Mesh, parts: Parts) -> None:
         self.present = cables.present()
         own, paths = [cable for _, cable in self.present], skeleton.layout.paths
-        self._chain = Chain(own, [len(path) for path in paths])
+        self.chain = Chain(own, [len(path) for path in paths])
         self.winches = Winches(own)
         self._unknowns, self._hub = mesh.unknowns, skeleton.layout.hub is not None
         self.points = sum(len(path) for path in paths)
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
-        self.ropes = self._chain.start(start)
+        self.ropes = self.chain.start(start)
         self.lines = lines_of(skeleton, parts, paths, self.ropes)
         self._turned_at, self._turned = math.nan, _Turned(*np.zeros((2, len(own), 2)))
-        friction = self._chain.friction
+        friction = self.chain.friction
         self.laws = Laws(
             self._taped(1, "decay"), self._taped(2, "by_angle", "by_speed"), friction.moves,
             friction.loads,
@@ -213,7 +215,7 @@ class FrameCables:
     def _taped(self, results: int, *names: str) -> Tape:
         """What the laws of the pulleys' friction say of all pulleys."""
         laws = []
-        for cable, own in zip(self._chain.cables, self._chain.pulleys, strict=True):
+        for cable, own in zip(self.chain.cables, self.chain.pulleys, strict=True):
             law = partial(_told, cable.friction, cable.pulley_radius, names)
             laws.append((law, (own.stop - own.start,), cable.friction))
         return taped(laws, 3, results)
@@ -236,7 +238,7 @@ class FrameCables:
         if not (least > SHORTEST and roped.drums.natural.min() > 0.0):  # NaN without an answer
             self.refuse(places, rates)
         log_decays = self.laws.decays.rows[_DECAY].copy()
-        return self._chain.read(
+        return self.chain.read(
             self.ropes, roped.ropes, roped.drums, roped.spans, log_decays, *self._turned
         )
 
@@ -267,7 +269,7 @@ class FrameCables:
 
     def refuse(self, places: Array, rates: Array) -> None:
         """ValueError, with what is wrong, where the chain has no answer."""
-        self._chain.state(self.ropes, places, rates, *self._turned)
+        self.chain.state(self.ropes, places, rates, *self._turned)
 
     def turn(self, time: float) -> None:
         """Let winches turn up to a time (s) that do not answer to their ropes: alike in all
@@ -293,13 +295,13 @@ class FrameCables:
     def _wind(self, wound: Array, rate: Array) -> None:
         """Let the winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
         for own, found in zip(
-            self.roped.drums, self._chain.drums(self.ropes, wound, rate), strict=True
+            self.roped.drums, self.chain.drums(self.ropes, wound, rate), strict=True
         ):
             own[:] = found
         self._turned = _Turned(wound, rate)
 
     def _retable(self) -> None:
-        table = self._chain.table(self.ropes, self.lines.span)
+        table = self.chain.table(self.ropes, self.lines.span)
         self.roped = Roped.of(self.ropes, table, self.points, self._unknowns, hub=self._hub)
         self._turned_at = math.nan
 

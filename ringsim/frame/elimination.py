@@ -23,8 +23,8 @@ from ringsim.layout.bodies import Array
 
 EIGHT = 8
 """Right-hand sides that are solved at a time."""
-_PANEL = 2 * EIGHT
-_WIDE = 3 * EIGHT
+PANEL = 2 * EIGHT
+WIDE = 3 * EIGHT
 """Columns at a time of what a panel leaves: as many as two neighbouring blocks have."""
 
 
@@ -44,18 +44,18 @@ class Fronts(NamedTuple):
         """Those of a mesh."""
         panels = np.array(
             [
-                (number, first, min(_PANEL, gone - first))
+                (number, first, min(PANEL, gone - first))
                 for number, gone in enumerate(mesh.gone.tolist())
-                for first in range(0, gone, _PANEL)
+                for first in range(0, gone, PANEL)
             ]
         )
         front, first, gone = panels.T
         # As far as what is read at a time reaches beyond the last column.
         kept = mesh.size[front] - first - gone
-        reach = first + np.maximum(gone + _WIDE * np.ceil(kept / _WIDE), _PANEL).astype(int)
+        reach = first + np.maximum(gone + WIDE * np.ceil(kept / WIDE), PANEL).astype(int)
         n, most = mesh.spots.shape
         columns = EIGHT * math.ceil(max(most, int(reach.max())) / EIGHT)
-        inverse = np.zeros((len(panels), _PANEL, _PANEL))
+        inverse = np.zeros((len(panels), PANEL, PANEL))
         return cls(np.zeros((n, most, columns)), panels, inverse, columns)
 
 

@@ -58,12 +58,12 @@ class Integration(Run):
     """One run of a model."""
 
     changing = ("_moves", "_taken", "_cubic", "_tried", "_steps", "_strains")
-    _model: FrameModel
+    model: FrameModel
 
     def __init__(self, model: FrameModel, watch: Watch | None = None) -> None:
         scene, elements = model.scene, len(model.mesh.length)
         super().__init__(scene, watch)
-        self._model, self._cables = model, model.cables
+        self.model, self._cables = model, model.cables
         # Two states take turns: the core has seen their tables.
         self._now, self._next = model.start.copy(), model.start.copy()
         self._energy = EnergyMeter(model)
@@ -82,7 +82,7 @@ class Integration(Run):
         )
 
     @property
-    def _state(self) -> State:
+    def state(self) -> State:
         """See ``Run``."""
         return self._now
 
@@ -94,7 +94,7 @@ class Integration(Run):
     @property
     def _laws(self) -> JointLaws:
         """See ``Run``."""
-        return self._model.laws
+        return self.model.laws
 
     def run(self) -> Recorder:
         """Integrate until all V-joints have locked and settled, or to the end time."""
@@ -123,7 +123,7 @@ class Integration(Run):
 
     def _begin(self, now: Instant) -> None:
         """Let joints and winches begin a step."""
-        self._model.laws.rubbing.forget()
+        self.model.laws.rubbing.forget()
         super()._begin(now)
 
     def _try(self, step: float) -> tuple[State, Instant]:
@@ -153,7 +153,7 @@ class Integration(Run):
 
     def _newton(self, time: float, step: float, after: State) -> None:
         """Newton's method with secants, in place."""
-        found = self._model.balance(time, step, self._now, after, self._strains)
+        found = self.model.balance(time, step, self._now, after, self._strains)
         self.history.newton_iterations += found.iterations
         self.history.jacobians += found.tangents
         self._choose(_MOST if found.why else found.iterations)
@@ -173,14 +173,14 @@ class Integration(Run):
             self._cubic, self._tried = not better, 0
 
     def _move(self, state: State, by: Array) -> None:
-        move(self._model.mesh, state.pose, by[: self._model.mesh.unknowns])
-        if self._model.with_hub:
+        move(self.model.mesh, state.pose, by[: self.model.mesh.unknowns])
+        if self.model.with_hub:
             state.hub += by[-3:]
 
     def _guess(self, step: float) -> Array:
         """Change of all unknowns over a step, from the last two steps or three."""
         if not self._moves:
-            return 0.5 * step**2 * self._model.first
+            return 0.5 * step**2 * self.model.first
         return extrapolated(self._moves[-3 if self._cubic else -2 :], step)
 
     def _accept(self, step: float, after: State, found: Instant) -> None:
@@ -196,9 +196,9 @@ class Integration(Run):
 
     def _between(self, before: State, after: State) -> Array:
         """Changes of all unknowns."""
-        found = np.zeros(self._model.size)
-        moved_between(self._model.mesh, before.pose, after.pose, found)
-        if self._model.with_hub:
+        found = np.zeros(self.model.size)
+        moved_between(self.model.mesh, before.pose, after.pose, found)
+        if self.model.with_hub:
             found[-3:] = after.hub - before.hub
         return found
 
@@ -213,14 +213,14 @@ class Integration(Run):
 
     def _measure(self, time: float, state: State) -> Instant:
         """A state, with its cables, and what has passed since the one that was kept last."""
-        cables = self._model.cables
+        cables = self.model.cables
         if cables is not None:
             state.chain = cables.state(time, state.place.lines, state.rate.lines)
         return self._known(time, state)
 
     def _known(self, time: float, state: State) -> Instant:
         """A state whose chain is known."""
-        angles, rates = self._model.openings.read(state.pose.angle, state.rate.angles)
+        angles, rates = self.model.openings.read(state.pose.angle, state.rate.angles)
         energies, gap = self._energy.read(time, state, self._strains)
         return self._told(time, angles, rates, energies, gap, state.chain)
 
@@ -270,7 +270,7 @@ class Storing(Integration):
 
     def _settings(self) -> dict[tuple[Any, ...], float]:
         """Those of laws that faults have switched on."""
-        switches = self._model.laws.switches
+        switches = self.model.laws.switches
         return {
             key: float(switches.setting[number][switches.laws[number].places.index(place)])
             for number, place, key in _of_faults(switches)
@@ -279,7 +279,7 @@ class Storing(Integration):
 
     def memory(self) -> Memory:
         """See ``Remembering``: all that the next step depends on, but step control."""
-        now, model, cables = self._now, self._model, self._model.cables
+        now, model, cables = self._now, self.model, self.model.cables
         memory = super().memory() | {
             "state": now.memory(),
             "latches": self._latches.memory(),
@@ -300,11 +300,11 @@ class Storing(Integration):
         self._now.recall(memory["state"])
         self._latches.recall(memory["latches"])
         self._energy.recall(memory["energy"])
-        self._model.reaction[:] = memory["reaction"]
+        self.model.reaction[:] = memory["reaction"]
 
     def _go_on(self, start: StoredState) -> None:
         """Take a stored state over."""
-        model, memory, changed = self._model, start.memory, start.changed_to(self._scene)
+        model, memory, changed = self.model, start.memory, start.changed_to(self._scene)
         self.recall(memory)
         state = self._now
         go_on(self._control, self._scene.solver, memory["stepping"], changed, start.name)
@@ -332,7 +332,7 @@ class Storing(Integration):
 
     def _strike_again(self, start: StoredState, gone: list[Fault]) -> None:
         """Let all faults have struck that had, but those that are gone."""
-        model = self._model
+        model = self.model
         # Those of the start have struck this model already, where it stood then.
         model.begin_laws(JointLaws(model.skeleton, model.openings))
         switches, planes = model.laws.switches, self._scene.structure.planes
@@ -353,13 +353,13 @@ class Storing(Integration):
 
     def _chain_of(self, start: StoredState, gone: list[Fault]) -> ChainState:
         """The cables."""
-        cables, memory, scene = self._model.cables, start.memory, start.scene
+        cables, memory, scene = self.model.cables, start.memory, start.scene
         assert cables is not None
         assert scene.cables is not None
         ropes = Ropes(cables.ropes.points_per_cable, *memory["ropes"])
         own = Struck(
             scene.structure.planes,
-            self._model.laws.switches,
+            self.model.laws.switches,
             np.pi - self._control.now.angles,
             ropes,
         )

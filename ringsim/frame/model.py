@@ -85,6 +85,8 @@ class FrameModel:
         The structure with rigid rods, at the start.
     moving
         Its acceleration then.
+    masses
+        Mass that every point carries, kg, (points,).
     prestress
         What putting the structure together has left in its rods, J.
     with_hub, size
@@ -155,8 +157,8 @@ class FrameModel:
         self._tau = float(mesh.tau.max())
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
         self._coordinates, self._ropes = coordinates(scene), RopeReach(scene)
-        self._masses = mesh.point_mass.copy()
-        np.add.at(self._masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
+        self.masses = mesh.point_mass.copy()
+        np.add.at(self.masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
         lines = 0 if self.cables is None else self.cables.points
         ends = self.web.ends
@@ -218,7 +220,7 @@ class FrameModel:
         at, start, forces = self._loaded
         done = float(np.vdot(forces, state.pose.place[at] - start))
         if self._held.weighs:
-            moved = self._masses @ (state.place.points - self._begun)
+            moved = self.masses @ (state.place.points - self._begun)
             if self.with_hub:
                 moved += self.web.hub_mass * (state.hub - self._hub)
             done += float(moved @ self.gravity)

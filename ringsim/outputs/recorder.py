@@ -41,7 +41,7 @@ class Recorder(Remembering):
     """A run of a scene: ``times``, ``angles``, ... of all accepted steps (see ``Instant``).
 
     An engine sets ``status``, ``fate`` and ``reason``, how and why it has ended, which latches have
-    ``caught``, and what its solver took.
+    ``caught``, and what its solver took.  ``readings`` are those of every output at these steps.
     """
 
     changing = ("newton_iterations", "jacobians", "_lost", "_driven")
@@ -49,7 +49,7 @@ class Recorder(Remembering):
     def __init__(self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None) -> None:
         """Begin a run; ``coordinates`` are those that its outputs declare themselves."""
         self._scene, self._coordinates = scene, coordinates or {}
-        self._readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
+        self.readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
         self._before: list[tuple[float, Scene]] = []
         self._lost = self._driven = 0.0
         self.times: list[float] = []
@@ -74,7 +74,7 @@ class Recorder(Remembering):
         work = energies.work + self._driven
         told = Energies(energies.kinetic, energies.elastic, work, self._lost, self._driven)
         now = replace(now, energies=told)
-        for output, readings in self._readings.items():
+        for output, readings in self.readings.items():
             readings.append(output.read(now))
 
     def forget_last(self) -> None:
@@ -82,7 +82,7 @@ class Recorder(Remembering):
         last = self.energies[-1]
         self._lost -= last.lost
         self._driven -= last.driven
-        for steps in (*self._lists().values(), self.energies, *self._readings.values()):
+        for steps in (*self._lists().values(), self.energies, *self.readings.values()):
             steps.pop()
 
     def memory(self) -> Memory:
@@ -92,7 +92,7 @@ class Recorder(Remembering):
     def history(self) -> Memory:
         """All steps so far, as arrays along the first axis; None of outputs that could not tell."""
         readings: Memory = {}
-        for output, values in self._readings.items():
+        for output, values in self.readings.items():
             untold = any(value is None for value in values)
             readings[type(output).__name__] = None if untold else np.array(values, dtype=float)
         lists: Memory = {name: np.array(steps) for name, steps in self._lists().items()}
@@ -114,7 +114,7 @@ class Recorder(Remembering):
         """
         self.recall(memory)
         steps, known = memory["steps"], history["readings"]
-        for output, readings in self._readings.items():
+        for output, readings in self.readings.items():
             name = type(output).__name__
             if name not in known:
                 names = ", ".join(variable.name for variable in output.variables)
@@ -153,13 +153,13 @@ class Recorder(Remembering):
         )  # fmt: skip
 
         def series_of(output: Output) -> Series | None:
-            readings = self._readings[output]
+            readings = self.readings[output]
             unknown = any(reading is None for reading in readings)
             return None if unknown else Series(times, np.array(readings, dtype=float), grid)
 
-        values = reduced(run, self._readings, series_of)
+        values = reduced(run, self.readings, series_of)
         coordinates = spanned(values, known)
-        passed = overloads(self._scene, self._readings, series_of)
+        passed = overloads(self._scene, self.readings, series_of)
         loose = slackened(self._scene, values)
         found = ended(self.status, self.fate, self.reason, passed, loose, coordinates, values)
         told = "" if self.status.failed else unresolved(run) + jerked(run)

@@ -132,7 +132,7 @@ def stage(run: xr.Dataset, shape: Shape, paint: _Paint) -> tuple[Figure, Callabl
     def show(time: float) -> None:
         _draw(lines, shape, paint, time, azimuth)
         opened = float(np.interp(time, mean["time"], mean))
-        clock.set_text(f"{time:6.2f} s  {opened:6.1f} degree open")
+        clock.set_text(f"{time:6.2f} s  {opened:6.1f} deg open")
         cursor.set_xdata([time, time])
 
     return figure, show
@@ -183,7 +183,7 @@ def by_lag(run: xr.Dataset, shape: Shape) -> _Paint:
     angle = run["opening_angle"]
     apart = abs(angle - angle.mean(["plane", "section"])).max(["plane", "section"])
     span = max(float(apart.max()), LEAST_SPAN)
-    units = str(angle.attrs.get("units", "degree"))
+    units = style.in_deg(str(angle.attrs.get("units", "degree")))
     words = "largest deviation of an opening angle from the mean"
     # Deviations are small until the first joints lock: colours go with their square roots.
     bent = FuncNorm(

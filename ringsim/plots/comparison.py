@@ -16,7 +16,7 @@ from ringsim.analysis.intervals import good, numbers, tells_of, used
 from ringsim.analysis.residuals import Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import legend, limits
+from ringsim.plots.campaign.frame import base_of, legend, limits, of_cases
 from ringsim.tables import (
     estimate_text,
     interval_text,
@@ -158,8 +158,8 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
 @style.styled
 def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Array]]]) -> Figure:
     """A panel a quantity over time: of runs their course, of campaigns the median with a band from
-    5 to 95 % of all samples, also of those that are over; ``read`` has times and rows of both by
-    quantity.
+    5 to 95 % of all samples, or the base case with the range of all cases, also of those that are
+    over; ``read`` has times and rows of both by quantity.
     """
     single = "sample" not in both[0].dims
     figure = Figure(figsize=(8.2, 2.3 * len(read) + 1.2))
@@ -184,14 +184,20 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
     if not single:
-        figure.legends[0].set_title(_OF_ALL)
+        told = dict.fromkeys(_BANDS_OF[of_cases(each)] for each in both)
+        figure.legends[0].set_title("\n".join([*told, _OVER]))
         figure.legends[0].get_title().set_fontsize(9)
     return figure
 
 
-_OF_ALL = (
-    "Lines are medians, bands 5 to 95 % of all samples. After its end a run counts on: a deployed\n"
-    "ring with 180 deg and in step, everything else with its last value."
+_BANDS_OF = {
+    False: "Lines are medians, bands 5 to 95 % of all samples.",
+    True: "Lines are the base case, if there is one; bands span all samples.",
+}
+"""By whether samples are cases that stand for no population."""
+_OVER = (
+    "After its end a run counts on: a deployed ring with 180 deg and in step, everything else\n"
+    "with its last value."
 )
 _DEPLOYED = {"opening_angle": 180.0, "asynchrony": 0.0}
 """What a deployed ring has: its last record may be before its last lock."""
@@ -206,7 +212,7 @@ def _last(dataset: xr.Dataset) -> float:
 
 def _course(dataset: xr.Dataset, name: str, until: float) -> tuple[Array, Array]:
     """Times and rows of a quantity up to a time (s), (quantile, time): of a run itself, of a
-    campaign ``_BANDS``.
+    campaign ``_BANDS``, or of cases the least, the base case and the largest.
     """
     time = dataset["time"].to_numpy()
     last = int(np.clip(np.searchsorted(time, until), 1, len(time) - 1))
@@ -221,7 +227,11 @@ def _course(dataset: xr.Dataset, name: str, until: float) -> tuple[Array, Array]
     held = np.concatenate(parts)
     rows = np.full((len(_BANDS), len(at)), np.nan)
     known = np.isfinite(held).any(axis=0)
-    rows[:, known] = np.nanquantile(held[:, known], _BANDS, axis=0)
+    if not of_cases(dataset):
+        rows[:, known] = np.nanquantile(held[:, known], _BANDS, axis=0)
+    else:
+        rows[::2, known] = np.nanquantile(held[:, known], [0.0, 1.0], axis=0)
+        rows[1] = held[0] if base_of(dataset) == 0 else np.nan
     return time[at], rows
 
 
@@ -284,4 +294,5 @@ def measured_and_computed(found: list[Residuals], title: str) -> Figure:
     left_out = len(over_time) - len(shown)
     more = f" ({left_out} sensors that fit better are not drawn)" * bool(left_out)
     style.title(figure, f"Measured and computed: {title}{more}")
+    style.in_readable_units(figure)
     return figure

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from ringsim.choice import kind_of
 from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
@@ -27,8 +28,10 @@ def drive(dataset: xr.Dataset) -> Figure:
     ``least_drive_margin``.
 
     Drawn over the mean opening angle of all V-joints, as long as it grows; resistances that drive
-    are left out.
+    are left out.  The margin is that of a ring which opens as a whole, and ends where a winch
+    stops: the rope that this one holds lets its plane open no further.
     """
+    stopped, winch = first_stop(dataset)
     known = dataset.isel(time=np.flatnonzero(np.isfinite(dataset["drive_margin"].values)))
     angle = known["opening_angle"].mean(("plane", "section")).values
     grows = angle >= np.maximum.accumulate(angle)
@@ -51,20 +54,47 @@ def drive(dataset: xr.Dataset) -> Figure:
     upper.set_ylim(bottom=0.0)
     upper.set_ylabel(f"Force on the opening angle ({known['drive_available'].attrs['units']})")
     figure.legend(*upper.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    margin = known["drive_margin"].values
+    margin = known["drive_margin"].where(known["time"] < stopped).values
     lower.plot(angle, margin, color=style.BLUE)
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
-    names = ("least_drive_margin_angle", "least_drive_margin")
-    where, least = (float(dataset[name]) for name in names)
-    lower.plot(where, least, "o", color=style.VERMILLION, markersize=6, zorder=4)
+    names = ("least_drive_margin_angle", "least_drive_margin", "least_drive_margin_time")
+    where, least, moment = (float(dataset[name]) for name in names)
+    if moment >= stopped and np.isfinite(margin).any():
+        where, least = angle[np.nanargmin(margin)], np.nanmin(margin)
+    told = []
+    if np.isfinite(margin).any():
+        lower.plot(where, least, "o", color=style.VERMILLION, markersize=6, zorder=4)
+        told = [f"least margin {least:.3f} at {where:.0f} deg"]
+    if (known["time"] >= stopped).any():
+        told.append(f"no margin from {stopped:.4g} s on: the {winch} has stopped")
     style.free(lower.text(
-        0.98, 0.95, f"least margin {least:.2f} at {where:.0f} deg", ha="right", va="top",
-        transform=lower.transAxes,
+        0.98, 0.95, "\n".join(told), ha="right", va="top", transform=lower.transAxes,
     ))  # fmt: skip
-    style.margin_axis(lower, margin, "Margin by the standard")
+    style.margin_axis(lower, margin, f"Margin by {standard_of(dataset)}")
     lower.set_xlabel("Mean opening angle (deg)")
     style.head(figure, upper, dataset, "Drive and resistance")
     return figure
+
+
+def standard_of(dataset: xr.Dataset) -> str:
+    """The name of the standard by which a scene has its margin, as ECSS-E-ST-33-01C."""
+    margin = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene").margin
+    return "the standard" if margin is None else kind_of(margin).upper()
+
+
+def first_stop(dataset: xr.Dataset) -> tuple[float, str]:
+    """When the first of a scene's winches is switched off (s), and its name; infinity if none is.
+
+    Of winches that turn at all, and not of those that stop because their plane has locked.
+    """
+    scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
+    stops = [
+        (winch.stop_time, f"{end} of the {scene.structure.planes[plane]} cable")
+        for plane, cable in ([] if scene.cables is None else scene.cables.present())
+        for end, winch in zip(("winch", "far winch"), cable.winches, strict=False)
+        if winch.stop_time is not None and winch.stop_time != winch.start_time
+    ]
+    return min(stops, default=(np.inf, ""))
 
 
 _MOTOR = ("motor_current", "motor_torque", "motor_speed", "motor_power")

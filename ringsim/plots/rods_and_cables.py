@@ -261,7 +261,7 @@ def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
     for name, values, words, units in (
         ("neutral_length", neutral, "neutral length of a span", "m"),
         ("elongation", 1e3 * strain * neutral, "span elongation", "mm"),
-        ("decay", decay, "decay factor of a section", "1"),
+        ("decay", decay, "tension behind a section over that before it", "1"),
         ("tension", at.entry, "tension at section start", "N"),
     ):
         found[name] = (("section", "time"), values, {"long_name": words, "units": units})
@@ -369,11 +369,15 @@ def pulleys(dataset: xr.Dataset) -> Figure:
 
 
 _DRAWN = ("along", "inwards")
+_MEANT = (
+    "Force of the cable on a pulley.  Along: in the direction of the section's bars, away from the "
+    "winch.\nInwards: from the plane of the cable towards the other plane."
+)
 
 
 @picture("run", 80, "Forces on the pulleys", ("cable_tension", "opening_angle"), barred)
 def nodal_forces(dataset: xr.Dataset) -> Figure:
-    """Components of the force on the pulleys of every section (paper 000, figs 9 and 10).
+    """Two components of the force on the pulleys of every section (paper 000, figs 9 and 10).
 
     One column for each plane with a cable; colour counts the sections from the winch.
     """
@@ -394,6 +398,6 @@ def nodal_forces(dataset: xr.Dataset) -> Figure:
         )
         row[0].set_ylabel(f"{node[:1].upper()}{node[1:]},\n{component} (N)")
         style.signed_sizes(row[0], drawn)
-    style.name_sections(figure, grid[0, 0])
+    style.name_sections(figure, grid[0, 0], _MEANT)
     style.head(figure, grid[0, 0], dataset, "Forces on the pulleys")
     return figure

@@ -186,7 +186,7 @@ def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
 
 
 def in_readable_units(figure: Figure) -> None:
-    """Let the axes and words of a figure of SI values give stress as people read it."""
+    """Let the axes and words of a figure give stress, in SI, and angles as people read them."""
     for axes, side in product(figure.axes, ("x", "y")):
         axis: Axis = getattr(axes, f"{side}axis")
         beside = getattr(figure, f"get_sup{side}label")()
@@ -196,7 +196,16 @@ def in_readable_units(figure: Figure) -> None:
             axis.set_minor_formatter(NullFormatter())
             axis.set_label_text(axis.get_label_text().replace(_PASCAL, f"({units})"))
     for text in figure.findobj(Text):
-        text.set_text(text.get_text().replace(_PASCAL, "(MPa)"))
+        text.set_text(in_deg(text.get_text().replace(_PASCAL, "(MPa)")))
+
+
+def in_deg(text: str) -> str:
+    """Words with the unit of angles as people write it; files hold "degree".
+
+    >>> in_deg("at most 3 degree"), in_deg("27 degrees of freedom")
+    ('at most 3 deg', '27 degrees of freedom')
+    """
+    return re.sub(r"\bdegrees?\b(?! of freedom)", "deg", text)
 
 
 _PASCAL = "(Pa)"
@@ -312,11 +321,15 @@ def some_sections(sections: int, most: int) -> list[int]:
     return [int(k) for k in np.unique(np.linspace(0, sections - 1, most).round())]
 
 
-def name_sections(figure: Figure, axes: Axes) -> None:
-    """Below the figure a legend of axes that have a named line for each section; six at most."""
+def name_sections(figure: Figure, axes: Axes, words: str = "") -> None:
+    """Below the figure a legend of axes that have a named line for each section; six at most.
+
+    Above it stands what the ``words`` of the figure mean.
+    """
     named = axes.get_legend_handles_labels()[0]
     lines = [named[section] for section in some_sections(len(named), 6)]
-    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), title=words or None,
+                  title_fontsize=9.5)  # fmt: skip
 
 
 _LAGS = LinearSegmentedColormap.from_list(

@@ -142,7 +142,7 @@
     }
     const step = Math.ceil(count / (width / 40));
     data.sections.forEach((name, n) => { if (n % step === 0) pen.fillText(name, x(n) - 4, low + 14); });
-    pen.fillText(`deviation from the mean (degree) by section: ${data.planes.join(" solid, ")} dashed`, left, height - 4);
+    pen.fillText(`deviation from the mean (deg) by section: ${data.planes.join(" solid, ")} dashed`, left, height - 4);
     data.planes.forEach((_, plane) => {
       pen.setLineDash(plane ? [5, 3] : []);
       pen.beginPath();
@@ -168,7 +168,7 @@
     (byId("view").value === "ring" ? drawRing : drawLag)(width, height, angles, mean);
     const spread = Math.max(...angles) - Math.min(...angles);
     told.textContent = `${time.toFixed(2)} s of ${end().toFixed(2)} s, mean opening angle ` +
-      `${mean.toFixed(1)} degree, asynchrony ${spread.toFixed(2)} degree.`;
+      `${mean.toFixed(1)} deg, asynchrony ${spread.toFixed(2)} deg.`;
     slider.value = Math.round((1000 * time) / end());
   }
 
@@ -236,7 +236,7 @@
       drawRing(side / 1.5, high / 1.5, anglesAt(moment), mean(moment));
     });
     time = now;
-    const words = moments.map((moment) => `${mean(moment).toFixed(1)} degree at ${moment.toFixed(2)} s`);
+    const words = moments.map((moment) => `${mean(moment).toFixed(1)} deg at ${moment.toFixed(2)} s`);
     told.textContent = `${sample.name}; mean opening angle ${words.join(", ")}.`;
   });
   window.addEventListener("afterprint", () => { canvas.width = 0; draw(); });

@@ -12,6 +12,8 @@ from ringsim.analysis.design import REACHED, UNKNOWN, endings, judged_by, median
 from ringsim.analysis.intervals import used
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.points import points_of
+from ringsim.plots.campaign.frame import base_of, of_cases
+from ringsim.plots.style import in_deg
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import COMPUTED, FROM_ANGLES, middle_of
 
@@ -29,8 +31,8 @@ def player(campaign: xr.Dataset, analysis: xr.Dataset) -> dict[str, Any] | None:
     """Data of the player for JSON; None if the structure has no joints that open between two rods,
     or nothing was recorded.
 
-    Shown are the median and the worst sample, the worst of each failure in ``analysis``, then
-    others that failed.
+    Shown are the median, or the base case of single changes, and the worst sample, the worst of
+    each failure in ``analysis``, then others that failed.
     """
     scene = scene_from_toml(str(campaign.attrs["scene"]), source="attribute scene")
     if "opening_angle" not in campaign or not points_of(layout_of(scene)).openings.size:
@@ -49,15 +51,19 @@ def player(campaign: xr.Dataset, analysis: xr.Dataset) -> dict[str, Any] | None:
 
 
 def _chosen(campaign: xr.Dataset, analysis: xr.Dataset) -> list[tuple[int, str]]:
-    """Samples with what they stand for: the median, the worst, the worst of each failure in turn,
-    then others that failed.
+    """Samples with what they stand for: the median or base case, the worst, the worst of each
+    failure in turn, then others that failed.
     """
     words, samples = endings(campaign), campaign["sample"].to_numpy()
     good, found = np.isin(samples, used(campaign)["sample"]), dict[int, list[str]]()
     if (both := median_and_worst(campaign)) is not None:
         by = f" by {name}" if (name := judged_by(campaign)) else ""
-        for sample, word in zip(both, ("median", "worst"), strict=True):
-            found.setdefault(sample, [f"{word}{by}"])
+        if of_cases(campaign):
+            base = base_of(campaign)
+            found |= {} if base is None else {base: ["base case"]}
+        else:
+            found[both[0]] = [f"median{by}"]
+        found.setdefault(both[1], list[str]()).append(f"worst{by}")
     fell_short = np.flatnonzero(~good | ~np.isin(words, (*REACHED, UNKNOWN)))
     # Those whose numbers do not hold first: nothing else on the page shows them.
     fell_short = fell_short[np.argsort(good[fell_short], kind="stable")]
@@ -69,7 +75,7 @@ def _chosen(campaign: xr.Dataset, analysis: xr.Dataset) -> list[tuple[int, str]]
             own += [each for each in failure.split("; ") if each.startswith(violating)]
     ends = dict(zip(samples.tolist(), words.tolist(), strict=True))
     return [
-        (sample, f"sample {sample}: {', '.join([*word, ends[sample]])}")
+        (sample, in_deg(f"sample {sample}: {', '.join([*word, ends[sample]])}"))
         for sample, word in found.items() if _recorded(campaign, sample)
     ]  # fmt: skip
 

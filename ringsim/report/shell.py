@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jinja2
+from markupsafe import Markup
 
 from ringsim.files import whole, writing
-from ringsim.plots.style import HEAVY, Inline
+from ringsim.plots.style import HEAVY, Inline, in_deg
 from ringsim.refusal import InputError
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def written(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    shell.filters["sentence"] = _sentence
+    shell.filters |= {"sentence": _sentence, "deg": in_deg, "head": _head}
     shape, text = shell.get_template(template), ""
     each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
@@ -54,7 +55,15 @@ def _sentence(line: str) -> str:
     """A line of a terminal as a sentence: with a capital, unless a name begins it."""
     first = line.split(maxsplit=1)[0] if line else ""
     named = not first.isalpha() or first != first.lower()
+    line = in_deg(line)
     return f"{line if named else line[0].upper() + line[1:]}."
+
+
+def _head(text: str) -> Markup:
+    """The head of a column, which may be broken at underscores: a table that is wider than the
+    paper makes browsers print all pages smaller.
+    """
+    return Markup("_<wbr>").join(in_deg(text).split("_"))
 
 
 _BROWSERS = "chromium", "chromium-browser", "google-chrome"

@@ -69,7 +69,7 @@ class Margin(NamedTuple):
 
 
 class DriveMargin:
-    """The drive of a scene by a standard; ``kinds`` are the names of what resists.
+    """The drive of a scene by a standard; ``kinds`` are the names of what resists, ``drive`` pulls.
 
     Raises
     ------
@@ -84,8 +84,8 @@ class DriveMargin:
                 "functions in which its places are linear (give it one, or leave margin out)"
             )
         self.mechanism, self.standard = Mechanism(scene), standard
-        self._drive = Drive(scene, self.mechanism, at_speed=standard.keep_speed)
-        self.conditions = self._drive.conditions
+        self.drive = Drive(scene, self.mechanism, at_speed=standard.keep_speed)
+        self.conditions = self.drive.conditions
         self._loads = SectionLoads(self.mechanism)
         self._resistances = resistances(scene, self.mechanism)
         self._ends_steeply = scene.latch is not None or (scene.net is not None and scene.net.steep)
@@ -108,11 +108,11 @@ class DriveMargin:
         ``keep_speed`` at the speed that the winches are commanded to.
         """
         standard, now = self.standard, self.mechanism.at(0.5 * (math.pi - angle))
-        over, state = self._drive.reeved(now), self.conditions.at(time)
-        rate, factor = self._drive.speed(over, state), standard.friction
+        over, state = self.drive.reeved(now), self.conditions.at(time)
+        rate, factor = self.drive.speed(over, state), standard.friction
         opening = Opening(angle, rate, 0.0, now, state.switches)
-        ideal, usual = (self._drive.pulls(state, over, rate, times) for times in (0.0, 1.0))
-        factored = self._drive.pulls(state, over, rate, factor, losses=factor)
+        ideal, usual = (self.drive.pulls(state, over, rate, times) for times in (0.0, 1.0))
+        factored = self.drive.pulls(state, over, rate, factor, losses=factor)
         loads = float(self._loads.at(now).clip(min=0.0).sum())  # what resists is a resistance
         driving = {CABLES: float(ideal.sum()), LOADS: loads}
         drive, required, accelerated = float(factored.sum()) + loads, 0.0, 0.0

@@ -63,13 +63,13 @@ class Run(Remembering):
     ----------
     _scene, _watch
         What is run; what is shown every state that it goes on from, or None.
-    _model, _energy, _cables
+    model, _energy, _cables
         The engine's model, its meter of energies, and its cables, None without.
     history
         The recorder of the run.
     """
 
-    _model: Any
+    model: Any
     _energy: Any
     _cables: Any
     history: Any
@@ -99,7 +99,7 @@ class Run(Remembering):
     # What an engine gives.
 
     @property
-    def _state(self) -> Any:
+    def state(self) -> Any:
         """The state that the run goes on from, as the meter of energies takes it."""
         raise NotImplementedError
 
@@ -149,7 +149,7 @@ class Run(Remembering):
     def _read(self, now: Instant) -> Instant:
         """Note a state that the run goes on from; returns it as events leave it."""
         if self._strike(now) | self._turn_loads(now.time) or self._events.at(now.time):
-            self._energy.go_on_from(now.energies.work, self._state)
+            self._energy.go_on_from(now.energies.work, self.state)
             self._begin(now)
             after = self._measured(now.time)
             # What a fault lets go is lost; nothing moves while it strikes.
@@ -180,7 +180,7 @@ class Run(Remembering):
         due = self._turn <= time + AT_ONCE
         if due:
             self._turn = math.inf
-            self._model.turn_loads()
+            self.model.turn_loads()
         return bool(due)
 
     def _accepted(self, found: Instant) -> bool:

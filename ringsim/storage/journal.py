@@ -115,7 +115,7 @@ class Journal:
     def append(self, result: Result) -> None:
         """Add a result; InputError if the disk is full, and the records before remain whole."""
         header, body = result.header(), result.body
-        check = _checksum(header, body)
+        check = checksum(header, body)
         frame = _FRAME.pack(_MAGIC, len(header), len(body), check)
         record = memoryview(frame + header + body)
         with writing(self.path, GO_ON):
@@ -178,12 +178,13 @@ def _read_record(file: BinaryIO, place: int) -> Result | None:
     if magic != _MAGIC or file.tell() + header_size + body_size > os.fstat(file.fileno()).st_size:
         return None
     header, body = file.read(header_size), file.read(body_size)
-    if _checksum(header, body) != expected:
+    if checksum(header, body) != expected:
         return None
     return Result.from_header(header, body)
 
 
-def _checksum(header: bytes, body: bytes) -> bytes:
+def checksum(header: bytes, body: bytes) -> bytes:
+    """Of one record, 16 bytes."""
     return hashlib.blake2b(header + body, digest_size=16).digest()
 
 

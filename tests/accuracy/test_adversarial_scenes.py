@@ -58,7 +58,9 @@ def scene_of(name: str) -> Scene:
     return scene.with_values(pull | far if both else pull)
 
 
-DEAR = {"ring-of-5-slow-last-lock", "arc-of-4-wound-from-both-ends"}
+DEAR = {
+    "ring-of-5-slow-last-lock", "arc-of-4-wound-from-both-ends", "heavy-ring-of-4-hard-stops",
+}  # fmt: skip
 """By default frames run them, for a fifth of the price; their bars are made by the same code."""
 CASES = [
     *(pytest.param(name, run_frame, id=f"{name}-frame") for name in sorted(DEAR)),

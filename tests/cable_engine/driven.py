@@ -117,7 +117,7 @@ class Bench:
         still = np.zeros(self.drive.pattern.unknowns)
         q = np.concatenate([(place - self.reference).ravel(), still])
         q_t = np.concatenate([rates.ravel(), still])
-        return self.drive._force(None, time, 0, q, q_t)[: self.width]
+        return self.drive.force(None, time, 0, q, q_t)[: self.width]
 
     def force_at(self, place: Array, velocities: Array, time: float = 0.0) -> Array:
         """The same for given velocities of the points, (nodes * 7,)."""

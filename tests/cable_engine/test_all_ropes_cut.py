@@ -12,7 +12,7 @@ from ringsim.simulation import simulate
 
 def test_a_cut_only_cable_is_no_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
     told: set[str] = set()
-    jacobian = CableDrive._jacobian
+    jacobian = CableDrive.jacobian
 
     def noting(self: CableDrive, *given: object) -> object:
         self.refusal = ""
@@ -20,7 +20,7 @@ def test_a_cut_only_cable_is_no_refusal(monkeypatch: pytest.MonkeyPatch) -> None
         told.add(self.refusal)
         return matrix
 
-    monkeypatch.setattr(CableDrive, "_jacobian", noting)
+    monkeypatch.setattr(CableDrive, "jacobian", noting)
     cut = {"kind": "cut-cable", "cable": "upper", "span": 1, "time": 0.2}
     values = {"cables.lower": "none", "solver.end_time": 0.6, "faults": [cut]}
     run = simulate(load_scene("truss2").with_values(values), fidelity="full")

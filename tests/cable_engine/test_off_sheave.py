@@ -111,7 +111,10 @@ def test_off_its_sheave_a_rope_is_held_or_carries_nothing(
     fidelity: str, rope: str, alike: dict[str, Any]
 ) -> None:
     fault = {"kind": "off-sheave", "pulley": "section 1 V", "rope": rope}
-    plain: dict[str, Any] = {"solver__end_time": 0.6, "record__interval": 0.05}
+    # The same steps, whatever they are.
+    plain: dict[str, Any] = {
+        "solver__end_time": 0.6, "record__interval": 0.05, "solver__tolerance": 3e-3,
+    }  # fmt: skip
     found, other = (
         run(fidelity, faults=[one | {"cable": "upper", "time": 0.45}], **plain)
         for one in (fault, alike)

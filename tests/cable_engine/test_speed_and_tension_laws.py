@@ -25,7 +25,7 @@ from ringsim.parts.margin import EcssMechanisms
 from ringsim.rigid.margin import PULLEYS, DriveMargin
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
-values = {"structure.opening_angle": 60.0, "record.interval": 0.05, "solver.end_time": 1.05,
+values = {"structure.opening_angle": 60.0, "record.interval": 0.05, "solver.end_time": 0.55,
           "cables.upper.friction": friction, "cables.lower.friction": friction}
 winding = {"kind": "motor", "stall_torque": 0.2, "no_load_speed": 600.0, "speed": 300.0,
            "drum_radius": 0.01}
@@ -40,7 +40,7 @@ motors = {f"cables.{plane}.winch.winding": winding for plane in ("upper", "lower
 drive = DriveMargin(scene.with_values(motors), EcssMechanisms())
 at = drive.at(1.5)
 now = drive.mechanism.at(0.5 * (math.pi - 1.5))
-over = drive._drive.reeved(now)[0].shortening.tolist()
+over = drive.drive.reeved(now)[0].shortening.tolist()
 told["margin"] = {"pulleys": at.resisting[PULLEYS], "shortening": over}
 print(json.dumps(told))
 """
@@ -53,9 +53,8 @@ FRICTIONS: dict[str, dict[str, Any]] = {
 
 
 @functools.cache
-def ran(name: str) -> dict[str, Any]:
+def ran(name: str, *engines: str) -> dict[str, Any]:
     laws = str(Path(__file__).parent / "own_laws")
-    engines = ["frame"] if name == "bearing" else ["frame", "full"]
     command = [sys.executable, "-c", RUN, laws, json.dumps(FRICTIONS[name]), *engines]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
@@ -63,11 +62,12 @@ def ran(name: str) -> dict[str, Any]:
     return answer
 
 
-@pytest.mark.parametrize("name", ["stribeck", "seal"])
+@pytest.mark.parametrize("name", ["stribeck", pytest.param("seal", marks=pytest.mark.slow)])
 def test_both_engines_agree_and_balance_their_energy(name: str) -> None:
-    frame, full = (ran(name)[fidelity] for fidelity in ("frame", "full"))
+    found = ran(name, "frame", "full")
+    frame, full = found["frame"], found["full"]
     angles = np.array(frame["angle"]), np.array(full["angle"])
-    assert angles[0][..., -1].min() > 65.0
+    assert angles[0][..., -1].min() > 61.0
     # With a law of the angle alone they differ by 3e-4 deg.
     assert np.nanmax(np.abs(angles[0] - angles[1])) < 1e-3
     assert max(frame["energy_error"], full["energy_error"]) < 1e-3
@@ -75,14 +75,17 @@ def test_both_engines_agree_and_balance_their_energy(name: str) -> None:
 
 def test_friction_that_falls_with_speed_leaves_more_tension() -> None:
     """The rope runs at several times ``speed``: what is left is ``kinetic``, 0.4 of the bearing."""
-    bearing, falling = (np.array(ran(name)["frame"]["tension"]) for name in ("bearing", "stribeck"))
-    lost = [-np.log(each[:, 1, 20] / each[:, 0, 20]) for each in (bearing, falling)]
+    bearing, falling = (
+        np.array(ran(name, *engines)["frame"]["tension"])
+        for name, engines in (("bearing", ["frame"]), ("stribeck", ["frame", "full"]))
+    )
+    lost = [-np.log(each[:, 1, 10] / each[:, 0, 10]) for each in (bearing, falling)]
     assert lost[1] == pytest.approx(0.4 * lost[0], rel=0.02)
 
 
-@pytest.mark.parametrize("fidelity", ["frame", "full"])
+@pytest.mark.parametrize("fidelity", ["frame", pytest.param("full", marks=pytest.mark.slow)])
 def test_each_pulley_takes_the_drag_of_its_seal(fidelity: str) -> None:
-    tension = np.array(ran("seal")[fidelity]["tension"])[:, :, 20]
+    tension = np.array(ran("seal", fidelity)[fidelity]["tension"])[:, :, 10]
     assert tension.min() > DRAG
     # 1 - tanh(6) of the friction fades at the slowest pulley.
     assert tension[:, :-1] - tension[:, 1:] == pytest.approx(DRAG, rel=1e-3)
@@ -90,7 +93,7 @@ def test_each_pulley_takes_the_drag_of_its_seal(fidelity: str) -> None:
 
 def test_the_margin_counts_the_drag_of_every_pulley() -> None:
     """T_i = T_0 - i F by virtual work: both cables lose F sum i dL_i."""
-    found = ran("seal")["margin"]
+    found = ran("seal", "frame")["margin"]
     shortening = np.array(found["shortening"])
     expected = 2.0 * DRAG * float(np.arange(len(shortening)) @ shortening)
     assert found["pulleys"] == pytest.approx(expected, rel=1e-9)

@@ -8,7 +8,7 @@ from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES, simulate
 from ringsim.variables import Fate, Status
 
-JAMMED_AT, SPEED = 1.0, 0.01
+JAMMED_AT, SPEED = 0.3, 0.01
 JAMS = [
     {"kind": "jammed-pulley", "cable": cable, "pulley": 1, "time": JAMMED_AT} for cable in (1, 2)
 ]

@@ -12,6 +12,7 @@ CHOOSING = """
 name = "choosing"
 seed = 3
 scene = "truss2"
+fidelity = "frame"
 design = { kind = "random", samples = 12 }
 
 [set]

@@ -23,6 +23,7 @@ def test_local_workers_give_the_serial_file(workers, bench, reference):
     xr.testing.assert_identical(comparable(bench.result("out")), comparable(reference))
 
 
+@pytest.mark.slow
 def test_mpi_ranks_give_the_serial_file(bench, reference, mpi):
     """Three; two do the same with checks, see test_campaign_judge.py."""
     bench.run("campaign", bench.write(), "--out", "out", ranks=3)

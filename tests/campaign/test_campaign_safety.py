@@ -133,11 +133,12 @@ def wait_until_some_are_done(bench, process, samples=1):
 SLEEPY = {"shared": '"rods.damping" = 0.05'}
 
 
-NOTICE = pytest.param(signal.SIGUSR1, marks=pytest.mark.slow)
-"""As Slurm sends it; it also reaches a campaign in the tests below."""
+OTHERS = [pytest.param(each, marks=pytest.mark.slow) for each in (signal.SIGINT, signal.SIGUSR1)]
+"""As a keyboard and Slurm send them: one interrupts a merge in test_campaign_together.py, the other
+reaches all ranks below."""
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, NOTICE])
+@pytest.mark.parametrize("number", [signal.SIGTERM, *OTHERS])
 def test_stop_signal_ends_the_campaign_and_it_goes_on_later(number, bench):
     start = ("campaign", bench.write(40, **SLEEPY), "--workers", 2, "--out", "out")
     process = bench.start(*start, solver="fake_solver:slow")

@@ -16,7 +16,7 @@ import slurm_cluster
 from campaign_bench import MODULES, PATH, Bench, comparable, ranks_of, records
 
 SCRIPTS = Path(__file__).parents[2] / "slurm"
-SAMPLES = 30
+SAMPLES = 24
 
 
 @pytest.fixture(scope="module")
@@ -81,26 +81,27 @@ def finish(cluster, bench, job, seconds=120):
     assert set(cluster.states(job)) == {"COMPLETED"}, printed(bench)
 
 
-def test_mpi_job_is_warned_leaves_is_requeued_and_completes(cluster, bench, local, mpi):
-    job = submit(cluster, bench, "mpi.sbatch")
-    wait_for(lambda: records(bench.folder / "out") >= 4, "the first samples")
-    cluster.ask("scancel", "--signal=USR1", "--batch", job)
-    wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "the job to stop")
-    kept = done_in_all(bench)
+def test_jobs_are_warned_leave_are_requeued_and_complete(cluster, local, tmp_path, mpi):
+    """One with MPI and, at the same time, one of two tasks, of which the second is warned."""
+    ranks, tasks = (Bench(tmp_path / name) for name in ("ranks", "tasks"))
+    for each in (ranks, tasks):
+        each.folder.mkdir()
+    first = submit(cluster, ranks, "mpi.sbatch")
+    second = submit(cluster, tasks, "array.sbatch", "--array=1-2")
+    wait_for(lambda: records(ranks.folder / "out") >= 4, "the first samples")
+    cluster.ask("scancel", "--signal=USR1", "--batch", first)
+    wait_for(lambda: records(tasks.folder / "out", "part2of2-*") >= 2, "the first samples")
+    cluster.ask("scancel", "--signal=USR1", "--batch", f"{second}_2")
+    wait_for(lambda: "stopped by SIGUSR1" in printed(ranks), "the job to stop")
+    kept = done_in_all(ranks)
     assert 4 <= kept < SAMPLES
-    finish(cluster, bench, job)
-    assert f"{kept} of {SAMPLES} samples done, 2 workers" in printed(bench)
-    xr.testing.assert_identical(comparable(bench.result("out")), comparable(local))
-    assert "MPI, 2 ranks" in bench.result("out").attrs["execution"]
-
-
-def test_array_tasks_are_warned_leave_are_requeued_and_merge(cluster, bench, local):
-    job = submit(cluster, bench, "array.sbatch", "--array=1-3")
-    wait_for(lambda: records(bench.folder / "out", "part2of3-*") >= 2, "the first samples")
-    cluster.ask("scancel", "--signal=USR1", "--batch", f"{job}_2")
-    wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "a task to stop")
-    finish(cluster, bench, job)
-    xr.testing.assert_identical(comparable(bench.result("out")), comparable(local))
+    wait_for(lambda: "stopped by SIGUSR1" in printed(tasks), "a task to stop")
+    finish(cluster, ranks, first)
+    assert f"{kept} of {SAMPLES} samples done, 2 workers" in printed(ranks)
+    assert "MPI, 2 ranks" in ranks.result("out").attrs["execution"]
+    finish(cluster, tasks, second)
+    for each in (ranks, tasks):
+        xr.testing.assert_identical(comparable(each.result("out")), comparable(local))
 
 
 @pytest.mark.slow

@@ -27,7 +27,11 @@ def blocked(pid):
     return any("->" in line and str(pid) in line.split() for line in lines)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+OTHERS = [pytest.param(each, marks=pytest.mark.slow) for each in (signal.SIGTERM, signal.SIGUSR1)]
+"""One handler takes all of them; see test_campaign_safety.py for these."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, *OTHERS])
 def test_stop_signal_interrupts_a_merge_and_the_next_run_merges(number, copied, whole):
     out = copied.folder / "out"
     (out / "campaign.nc").unlink()
@@ -66,7 +70,7 @@ def test_signal_after_the_last_sample_is_no_failure(copied, whole):
 
 
 def test_signal_to_one_rank_stops_all_of_them(bench, mpi):
-    start = ("campaign", bench.write(60, shared='"rods.damping" = 0.1'), "--out", "out")
+    start = ("campaign", bench.write(45, shared='"rods.damping" = 0.1'), "--out", "out")
     process = bench.start(*start, ranks=3, solver="fake_solver:slow")
     out = bench.folder / "out"
     end = time.monotonic() + 60.0
@@ -79,7 +83,7 @@ def test_signal_to_one_rank_stops_all_of_them(bench, mpi):
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
     assert "stopped by SIGUSR1" in printed
-    bench.run(*start, ranks=3, solver="fake_solver:slow")
+    bench.run(*start, "--workers", 4, solver="fake_solver:slow")
     assert (bench.result("out").status == 0).all()
 
 

@@ -20,13 +20,13 @@ from ringsim.variables import Status
 @pytest.fixture
 def checksums(monkeypatch):
     """Counts the checksums that are computed."""
-    real, counted = journal_file._checksum, []
+    real, counted = journal_file.checksum, []
 
     def counting(*parts):
         counted.append(1)
         return real(*parts)
 
-    monkeypatch.setattr(journal_file, "_checksum", counting)
+    monkeypatch.setattr(journal_file, "checksum", counting)
     return counted
 
 

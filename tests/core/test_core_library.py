@@ -36,7 +36,7 @@ from ringsim.simulation import simulate
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import building
 
-WIDE = library._has_wide_registers()
+WIDE = library.has_wide_registers()
 
 
 def pose(axes: np.ndarray) -> Pose:
@@ -63,7 +63,7 @@ def test_tables_are_as_large_here_as_in_c_and_so_are_constants() -> None:
     )  # fmt: skip
     sizes = {kind.__name__: library.words_of(kind) for kind in tables}
     assert sizes == {k.__name__: call("words_of_table", n) for n, k in enumerate(tables)}
-    here = elimination._PANEL, elimination._WIDE, elimination.EIGHT
+    here = elimination.PANEL, elimination.WIDE, elimination.EIGHT
     assert here == tuple(call("constant_of_fronts", n) for n in range(3))
 
 
@@ -74,24 +74,24 @@ def test_a_checkout_that_is_not_compiled_takes_the_installed_library(
     """As where a campaign is started in a checkout, and ringsim is installed from it."""
     installed = tmp_path / "site-packages"
     (installed / "ringsim" / "core").mkdir(parents=True)
-    (installed / "ringsim" / "core" / "c").symlink_to(library._FOLDER)
+    (installed / "ringsim" / "core" / "c").symlink_to(library.FOLDER)
     checkout = tmp_path / "checkout"
-    shutil.copytree(library._FOLDER, checkout, ignore=shutil.ignore_patterns("*.so"))
+    shutil.copytree(library.FOLDER, checkout, ignore=shutil.ignore_patterns("*.so"))
     made = [Distribution.at(place / "ringsim.dist-info") for place in (checkout, installed)]
-    monkeypatch.setattr(library, "_FOLDER", checkout)
+    monkeypatch.setattr(library, "FOLDER", checkout)
     monkeypatch.setattr(library, "distributions", lambda name: made)
-    assert library._library.__wrapped__().compiled_from().decode() == library._digest()
+    assert library.loaded.__wrapped__().compiled_from().decode() == library.digest()
     (checkout / "laws.c").write_text("other sources")
     with pytest.raises(NotBuiltError, match="from other sources"):
-        library._library.__wrapped__()
+        library.loaded.__wrapped__()
 
 
 @pytest.mark.quick
 def test_a_library_of_other_sources_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a change of them a checkout must be compiled again: tables may have other fields."""
-    monkeypatch.setattr(library, "_digest", lambda: "0123")
+    monkeypatch.setattr(library, "digest", lambda: "0123")
     with pytest.raises(NotBuiltError, match="was compiled from other sources: run pip install"):
-        library._library.__wrapped__()
+        library.loaded.__wrapped__()
 
 
 @pytest.mark.quick
@@ -123,27 +123,27 @@ def test_a_very_long_ring_has_a_tangent() -> None:
 @pytest.mark.quick
 def test_tables_are_forgotten_one_day_and_never_mistaken() -> None:
     """More tables than are kept: each call sees its own arrays, also where an id comes again."""
-    for n in range(3 * library._MOST_KNOWN):
+    for n in range(3 * library.MOST_KNOWN):
         axes = (1.0 + 1e-9 * n) * np.tile(np.eye(3), (2, 1, 1))
         call("straighten", pose(axes))
         np.testing.assert_allclose(axes, np.tile(np.eye(3), (2, 1, 1)), atol=1e-12)
-    assert len(library._known) <= library._MOST_KNOWN
+    assert len(library._known) <= library.MOST_KNOWN
 
 
 @pytest.mark.quick
 def test_a_core_that_is_not_compiled_is_told_with_the_cure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(library, "_FOLDER", tmp_path)
+    monkeypatch.setattr(library, "FOLDER", tmp_path)
     monkeypatch.setattr(library, "distributions", lambda name: [])
     with pytest.raises(NotBuiltError, match=r"not compiled here: run pip install \."):
-        library._library.__wrapped__()
+        library.loaded.__wrapped__()
 
 
 BITS = """
 import json, sys
 from ringsim.core import library
-library._has_wide_registers = lambda: sys.argv[1] == "wide"
+library.has_wide_registers = lambda: sys.argv[1] == "wide"
 import ringsim
 scene = ringsim.load_scene("ring18-cable").with_values(
     {"structure.sections": 3, "solver.end_time": 2.0}
@@ -176,7 +176,7 @@ def test_a_compiler_is_asked_for_only_where_there_is_none(monkeypatch: pytest.Mo
     monkeypatch.setattr(building, "has_compiler", lambda: False)
     assert asked() == ["other", building.COMPILER]
     monkeypatch.setattr(os, "environ", {})
-    building._choose_compiler()
+    building.choose_compiler()
     assert os.environ["CC"].endswith("-m ziglang cc -mcpu=baseline")
 
 

@@ -120,7 +120,7 @@ ring["faults"] = [{"kind": "failed-section", "section": 2, "time": 0.01}]
 import ringsim
 scene = ringsim.load_scene("ring18").with_values(ring)
 """
-    for text, end in (friction, 1.0), (stribeck, 1.0), (fault + struck, 0.3):
+    for text, end in (friction, 0.5), (stribeck, 0.5), (fault + struck, 0.3):
         script(Path("own_structure"), tmp_path, text + compare.replace("END", str(end)))
 
 

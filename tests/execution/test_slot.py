@@ -124,7 +124,7 @@ def test_process_that_cannot_be_started_is_refused(slots, monkeypatch):
 def test_stop_signal_to_a_process_that_is_just_starting_is_not_its_fault(slots):
     slot = slots()
     slot.submit(0, {"loads.force": 0.015})
-    os.kill(slot._process.pid, signal.SIGUSR1)
+    os.kill(slot.pid, signal.SIGUSR1)
     assert awaited(slot).status is Status.OK
 
 
@@ -170,7 +170,7 @@ def test_solver_process_ends_with_its_parent():
         while slot.poll() is None:
             pass
         slot.submit(1, {"solver.end_time": 1000.0})
-        print(slot._process.pid, flush=True)
+        print(slot.pid, flush=True)
         os.kill(os.getpid(), 9)
         """
     )

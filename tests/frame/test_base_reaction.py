@@ -44,7 +44,7 @@ class Course:
         self.whole, self.rest, self.states = [], [], []
 
         def note(_: Any) -> None:
-            state = run._now.copy()
+            state = run.state.copy()
             self.whole.append(momenta(model, state))
             self.rest.append(momenta(model, state, craft=False))
             self.states.append(state)
@@ -53,7 +53,7 @@ class Course:
         history = run.run()
         self.model, self.times = model, np.array(history.times)
         self.outcome = history.outcome()
-        readings = {type(output): values for output, values in history._readings.items()}
+        readings = {type(output): values for output, values in history.readings.items()}
         self.reaction = np.array(readings.get(BaseReaction, []))
         self.rotation = np.array(readings[BaseRotation])
 

@@ -85,12 +85,12 @@ def test_accepted_states_are_those_of_the_chain(faults: bool) -> None:
     """All that energies and outputs read of a chain, after a run: whole, jammed and cut ropes."""
     values = CABLES_AND_FAULTS["faults"] if faults else {}
     run = Integration(FrameModel(of_cables(values | {"solver.end_time": 0.4})))
-    run.run()
-    cables, state, time = run._model.cables, run._now, run._control.now.time
+    time = run.run().times[-1]
+    cables, state = run.model.cables, run.state
     assert cables is not None
     found = cables.state(time, state.place.lines, state.rate.lines)
     wound = found.wound, found.wound_rate
-    truth = cables._chain.state(cables.ropes, state.place.lines, state.rate.lines, *wound)
+    truth = cables.chain.state(cables.ropes, state.place.lines, state.rate.lines, *wound)
     assert found.tensions.max() > 1.0
     assert found.ropes.alive.tolist() == ([True, True, False] if faults else [True, True])
     for field in fields(ChainState):

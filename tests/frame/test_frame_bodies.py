@@ -118,7 +118,7 @@ def _momenta(values: dict[str, Any]) -> tuple[float, float]:
     run = Integration(model, watch=lambda _: found.append(momenta(run)))
 
     def momenta(run: Integration) -> tuple[np.ndarray, np.ndarray, float, float]:
-        state, mesh = run._now, model.mesh
+        state, mesh = run.state, model.mesh
         place, rate = state.place.points, state.rate.points
         carried = mesh.point_mass[:, None] * rate
         one, other = mesh.mass.T

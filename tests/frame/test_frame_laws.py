@@ -18,7 +18,7 @@ FLOOR = 1e-4
 SLOW = {
     "forces": {"viscous-vjoint", "dry-vjoint", "dry-pivot", "dry-hinge", "viscous-sections",
                "damped-rods", "force-sections", "net", "rigid-free", "arc-2-free", "damped-net",
-               "free-stop", "edge-net", "ramps"},
+               "arc-5", "flexible-free", "free-stop", "edge-net", "ramps"},
     "cables": {"bearing", "bearing-exact", "both", "bar-half", "table", "damped-rope", "jammed",
                "cut", "stuck", "last", "capstan-pulleys", "frictionless", "stall", "two-winches",
                "feedback", "locked", "constant", "arc-2-flexible", "boom-and-net", "late-lower",

@@ -102,8 +102,9 @@ def test_what_python_raises_below_the_core_arrives(
 ) -> None:
     """A winch that answers is asked from within Newton's method: nothing is swallowed there."""
     scene = of_cables(CABLES["motor"] | {"solver.end_time": 0.1})
-    run = Integration(FrameModel(scene))
-    own, asked = run._cables.answer, 0
+    model = FrameModel(scene)
+    run = Integration(model)
+    own, asked = model.cables.answer, 0
 
     def refuse(time: float) -> None:
         nonlocal asked
@@ -112,7 +113,7 @@ def test_what_python_raises_below_the_core_arrives(
             raise error
         own(time)
 
-    monkeypatch.setattr(run._cables, "answer", refuse)
+    monkeypatch.setattr(model.cables, "answer", refuse)
     if isinstance(error, KeyboardInterrupt):
         with pytest.raises(KeyboardInterrupt):
             run.run()

@@ -72,7 +72,7 @@ def test_the_base_carries_the_weight() -> None:
     """Reaction and weight together give the ring its momentum, M g and r x M g by hand."""
     course = Course(heavy(*ASLANT, solver__step=0.0025, solver__end_time=0.4))
     whole, pushed = np.array(course.whole), impulses(course)
-    masses, start = course.model._masses, course.times[0]
+    masses, start = course.model.masses, course.times[0]
     gravity = course.model.gravity
     base = course.model.layout.bodies[0].pose.place
     weight = masses.sum() * gravity * (course.times[1:, None] - start)
@@ -108,10 +108,11 @@ def test_a_hanging_boom_stretches() -> None:
     boom = {"kind": "flexible", "young_modulus": 1e10, "elements": 48, "base": "fixed"}
     scene = heavy(0.0, 0.0, -1.0, boom=boom, solver__end_time=0.2, solver__spectral_radius=0.2)
     expected = 1800.0 * 0.9**2 / 2e10
-    run = ByFrames(FrameModel(scene))
+    model = FrameModel(scene)
+    run = ByFrames(model)
     run.run()
-    top, low = run._model.skeleton.beam[0].frame, run._model.skeleton.beam[-1].frame
-    places = run._now.pose.place
+    top, low = model.skeleton.beam[0].frame, model.skeleton.beam[-1].frame
+    places = run.state.pose.place
     assert places[top, 2] - places[low, 2] - 0.9 == pytest.approx(expected, rel=1.5e-2)
     built = build(scene)
     ByExudyn(built).run()

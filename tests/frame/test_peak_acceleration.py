@@ -41,7 +41,7 @@ def test_they_are_the_rates_of_velocities(engine: str) -> None:
     the rods' first, at 30 rad/s.
     """
     history = run_of(engine)
-    readings = {type(output): values for output, values in history._readings.items()}
+    readings = {type(output): values for output, values in history.readings.items()}
     found = history.outcome()
     names = found.coordinates["point"].tolist()
     corners = found.coordinates["corner"].tolist()

@@ -93,8 +93,8 @@ BEGUN_ANEW = "until", "_states", "_cables", "_next", "_held"
 def parts(run: Storing) -> dict[str, Any]:
     """All that a run has, but the states that it has stored."""
     own = {name: value for name, value in vars(run).items() if name not in BEGUN_ANEW}
-    cables = run._model.cables
-    own["laws"] = run._model.laws
+    cables = run.model.cables
+    own["laws"] = run.model.laws
     return own if cables is None else own | {"winches": cables.winches, "ropes": cables.ropes}
 
 

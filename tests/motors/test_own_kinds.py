@@ -41,7 +41,7 @@ def ring(opening: float) -> Scene:
             "structure.sections": 3, "structure.opening_angle": opening, "loads": "none",
             "boom": "none", "net": "none", "joints.vjoint": {"viscous": 2e-3},
             "hinge_spring": {"kind": "bistable", "stiffness": [0.8, 1.0, 1.2]},
-            "solver.end_time": 1.0, "solver.tolerance": 2e-4, "solver.newton_tolerance": 1e-6,
+            "solver.end_time": 0.6, "solver.tolerance": 5e-4, "solver.newton_tolerance": 1e-6,
         }
     )  # fmt: skip
 

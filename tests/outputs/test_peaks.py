@@ -192,6 +192,7 @@ def test_a_run_tells_what_its_series_hold(fidelity, tmp_path) -> None:
 CAMPAIGN = """
 name = "two"
 scene = "truss2"
+fidelity = "frame"
 design = { kind = "random", samples = 2 }
 
 [set]
@@ -230,7 +231,7 @@ def test_places_and_names_survive_a_campaign(tmp_path, monkeypatch) -> None:
         load_scene("truss2").with_values(
             {"solver.end_time": 0.1, "cables.upper.friction.coefficient[2]": 0.001, **values}
         ),
-        "full",
+        "frame",
     )
     assert run.peak_tension_span == found.peak_tension_span[1]
     assert run.peak_tension.item() == found.peak_tension[1].item()

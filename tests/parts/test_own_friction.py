@@ -47,6 +47,7 @@ def scene(sections: int, **values: Any) -> Scene:
         "structure.sections": sections, "structure.aspect_ratio": 1.0, "net": "none",
         "rods.damping": 0.0, "rods.young_modulus": 120e10, "loads.force": 0.03,
         "solver.tolerance": 1e-4, "solver.newton_tolerance": 1e-5, "joints.vjoint": dict(LAW),
+        "solver.settling_time": 0.0,
     }  # fmt: skip
     return load_scene("ring18").with_values(
         plain | {k.replace("__", "."): v for k, v in values.items()}

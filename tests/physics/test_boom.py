@@ -154,12 +154,12 @@ def test_a_prismatic_joint_holds_the_turns_that_a_sleeve_leaves() -> None:
         one = exact.run().outcome().values
         nodes = [built.model.bodies[plane[0]][1] for plane in built.model.layout.corners]
         where = np.array([built.model.assembly.coordinates_of(node)[3:] for node in nodes])
-        turns = axes_of(exact._now.position[where])
+        turns = axes_of(exact.state.position[where])
         run = Frames(FrameModel(scene))
         two = run.run().outcome().values
         for upper, lower in (
             turns,
-            run._now.pose.axes[[plane[0] for plane in run._model.layout.corners]],
+            run.state.pose.axes[[plane[0] for plane in run.model.layout.corners]],
         ):
             turned = np.degrees(Rotation.from_matrix(upper.T @ lower).magnitude())
             assert (turned < 1e-6) if holds else (turned > 1.0)

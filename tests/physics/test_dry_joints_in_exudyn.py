@@ -66,7 +66,7 @@ def test_residuals_are_those_of_the_law_as_a_user_function(monkeypatch: Any) -> 
 def test_accepted_states_carry_the_torque_of_the_law() -> None:
     built = build(even())
     system, found = built.model.assembly.system, []
-    families = built.model.assembly.dry_joints._families
+    families = built.model.assembly.dry_joints.families
     assert sum(len(dampers) for _, dampers, _ in families) == 6 + 3
 
     def look(_: Any) -> None:

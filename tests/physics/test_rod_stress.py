@@ -71,6 +71,7 @@ def at_rest(kind: str, elements: int) -> xr.Dataset:
             "record.interval": 0.02,
             "solver.settling_time": 1.0,
             "solver.end_time": 2.0,
+            "solver.tolerance": 1e-3,
         }
         | heavy
     )

@@ -25,7 +25,7 @@ CHANGES: dict[str, dict[str, Any]] = {
 def deviations(path: str, section: int) -> Array:
     """Opening angles less their mean, deg, where one section differs; shape (2, sections)."""
     change = CHANGES[path]
-    scene = ring(6, **ROUND).with_values(
+    scene = ring(4, **ROUND).with_values(
         {path: change[path], f"{path}[{section}]": change["section"]}
     )
     last = run(scene).angles[-1]

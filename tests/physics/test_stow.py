@@ -33,6 +33,7 @@ SMALL = STOW.with_values(
         "boom": "none",
         "solver.step": 0.05,
         "record.interval": 0.02,
+        "solver.settling_time": 0.0,
     }
 )
 

@@ -46,7 +46,7 @@ def test_a_frame_shows_positions_time_and_who_is_ahead(computed: bool) -> None:
     figure, show = stage(one, shape, animation.by_lag(one, shape))
     show(5.0)
     words = [text.get_text() for text in figure.texts]
-    assert any(" 5.00 s" in text and "100.0 degree open" in text for text in words)
+    assert any(" 5.00 s" in text and "100.0 deg open" in text for text in words)
     assert (COMPUTED if computed else FROM_ANGLES) in words
     (lines,) = figure.axes[0].collections
     segments, colours = np.array(lines.get_segments()), np.array(lines.get_color())

@@ -24,9 +24,9 @@ from ringsim.plots import style
 from ringsim.plots.campaign import endings
 from ringsim.plots.campaign.courses import lock_order, shares
 from ringsim.plots.campaign.endings import angle_grid, base_load, laid_on, margin, motors, tension
-from ringsim.plots.campaign.frame import shown
+from ringsim.plots.campaign.frame import moves, shown
 from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
-from ringsim.plots.campaign.tornado import moves, named, one_by_one
+from ringsim.plots.campaign.tornado import named, one_by_one
 from ringsim.plots.figures import PICTURES, draw_figures, figures_of
 from ringsim.variables import Fate
 
@@ -342,7 +342,7 @@ def test_one_at_a_time_names_every_change() -> None:
     assert not joined(panel)
     names = {picture.name for picture, _ in figures_of(campaign)}
     assert "one_by_one" in names
-    assert not {"distributions", "convergence"} & names
+    assert not {"distributions", "convergence", "tornado"} & names
 
 
 def test_panels_are_for_numbers_that_differ_or_have_limits() -> None:

@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from ringsim.plots.figures import draw_figures
 from ringsim.plots.peaks import peak_of
 from ringsim.plots.ring import strain_over_length, tension_over_length
-from ringsim.plots.rods_and_cables import cables, rod_stress
+from ringsim.plots.rods_and_cables import cables, nodal_forces, rod_stress
 from ringsim.plots.run import asynchrony
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
@@ -33,7 +33,7 @@ def truss() -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def planar() -> xr.Dataset:
-    fields = {"solver.end_time": 0.5, "record.interval": 0.1}
+    fields = {"solver.end_time": 0.2, "record.interval": 0.1}
     return simulate(load_scene("planar-truss").with_values(fields))
 
 
@@ -121,7 +121,7 @@ def test_both_cables_share_their_axes(truss):
     assert len(axes) == 8
     for row in zip(axes[::2], axes[1::2], strict=True):
         assert row[0].get_ylim() == row[1].get_ylim()
-        if not row[0].get_ylabel().startswith("Tension"):
+        if not row[0].get_ylabel().startswith("Tension at"):
             continue
         for panel, plane in zip(row, ("upper", "lower"), strict=True):
             behind_hinge = truss.cable_tension.sel(plane=plane, span=2)
@@ -140,3 +140,11 @@ def test_every_figure_of_a_truss_is_written(truss, tmp_path):
     paths = draw_figures(truss, tmp_path, "truss2")
     assert len(paths) == 9
     assert all(path.name.startswith("truss2-fig-") for path in paths)
+
+
+def test_the_terms_of_cable_figures_are_explained(truss):
+    labels = [axes.get_ylabel().replace("\n", " ") for axes in cables(truss).axes]
+    assert "Tension behind a section over that before it" in labels
+    meant = nodal_forces(truss).legends[0].get_title().get_text()
+    assert "Along: in the direction of the section's bars, away from the winch." in meant
+    assert "Inwards: from the plane of the cable towards the other plane." in meant

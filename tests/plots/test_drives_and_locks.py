@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,7 +12,7 @@ from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_motor
 from ringsim.analysis.courses import courses, ends
 from ringsim.plots.campaign.endings import latch_rate, lock_impulse, margin
 from ringsim.plots.campaign.endings import motors as motors_of_samples
-from ringsim.plots.drives_and_locks import least_rate, locks, motors
+from ringsim.plots.drives_and_locks import drive, least_rate, locks, motors
 from ringsim.plots.figures import figures_of
 from ringsim.plots.style import locked_time
 from ringsim.scene import Scene, load_scene
@@ -160,3 +162,50 @@ def test_a_ring_whose_latches_missed_is_not_over_when_it_came_to_180_degrees() -
         wanted, abs=1e-4
     )
     assert TIMES[-1] == 10.0
+
+
+def with_margin(least: float, moment: float, stop: float) -> xr.Dataset:
+    """A run of motors by the standard of NASA: its margin falls from 1 to ``least`` at a time (s),
+    and rises to 2 again; the lower winch stops at another.
+    """
+    made = with_motors(made_campaign(1)).isel(sample=0, drop=True)
+    scene = load_scene("ring18-motor").with_values({
+        "structure.sections": SECTIONS, "margin.kind": "nasa-std-5017b",
+        "cables.lower.winch.stop_time": stop if math.isfinite(stop) else "none",
+    })  # fmt: skip
+    made["drive_margin"] = made["drive_margin"].copy(
+        data=np.interp(TIMES, [0.0, moment, 10.0], [1.0, least, 2.0])
+    )
+    kinds = {"resistance": ["pulley friction"]}
+    told = {"units": "N m"}
+    return made.assign_coords(kinds).assign(
+        drive_available=("time", 1.0 + TIMES, told),
+        drive_resistance=(("resistance", "time"), np.ones((1, len(TIMES))), told),
+        least_drive_margin=least, least_drive_margin_time=moment,
+        least_drive_margin_angle=20.0 + 16.0 * moment,
+    ).assign_attrs(scene=scene.to_toml())  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("moment", "stop", "told"),
+    [
+        (5.0, math.inf, "least margin -0.005 at 100 deg"),
+        (2.0, 6.0, "least margin -0.005 at 52 deg\n"
+         "no margin from 6 s on: the winch of the lower cable has stopped"),
+        # The least one of all comes after the stop: of those before, it is the last.
+        (8.0, 4.0, "least margin 0.560 at 76 deg\n"
+         "no margin from 4 s on: the winch of the lower cable has stopped"),
+    ],
+)  # fmt: skip
+def test_the_margin_of_a_run_ends_where_a_winch_stops(
+    moment: float, stop: float, told: str
+) -> None:
+    run = with_margin(-0.005, moment, stop)
+    axes = drive(run).axes[1]
+    assert told in [text.get_text() for text in axes.texts]
+    assert axes.get_ylabel().startswith("Margin by NASA-STD-5017B")
+    last = TIMES[stop > TIMES][-1]
+    curve, _, least = axes.lines
+    known = np.isfinite(curve.get_ydata())
+    assert curve.get_xdata()[known][-1] == pytest.approx(20.0 + 16.0 * last)
+    assert least.get_ydata()[0] == pytest.approx(curve.get_ydata()[known].min())

@@ -19,7 +19,7 @@ from matplotlib.text import Text
 from ringsim.dataset import to_dataset
 from ringsim.outputs import VARIABLES
 from ringsim.plots import figures, registry, style
-from ringsim.plots.figures import PICTURES, draw_figures, figures_of, left_out
+from ringsim.plots.figures import PICTURES, draw_figures, figures_of, left_out, names_for
 from ringsim.plots.ring import ring
 from ringsim.plots.rods_and_cables import default_sections, rod_stress
 from ringsim.plots.run import (
@@ -284,7 +284,9 @@ def test_energies_are_drawn_in_the_unit_of_the_label(drawn, deployed):
     assert "2.3e-05" in lower.get_title(loc="left")
 
 
-@pytest.mark.parametrize(("sections", "closed"), [(1, False), (6, True), (72, True)])
+@pytest.mark.parametrize(
+    ("sections", "closed"), [(1, False), pytest.param(6, True, marks=pytest.mark.slow), (72, True)]
+)
 def test_no_words_leave_the_sheet_or_meet(sections, closed, scene_of, made_run):
     run = made_run(scene_of(sections, closed=closed))
     for draw in DRAWINGS:
@@ -308,7 +310,7 @@ OF_RINGS = {"opening_angles", "asynchrony", "section_map", "rod_stress", "ring",
 
 
 def test_only_figures_that_apply_are_written(tmp_path, deployed, scene_of, made_run):
-    assert {picture.name for picture, _ in figures_of(deployed)} == OF_RINGS | {"locks"}
+    assert set(names_for(deployed)) == OF_RINGS | {"locks"}
     plain = made_run(scene_of(6, parts=False), stress=False)
     paths = draw_figures(plain, tmp_path / "plain")
     names = OF_RINGS - {"rod_stress"} | {"locks"}
@@ -319,7 +321,7 @@ def test_only_figures_that_apply_are_written(tmp_path, deployed, scene_of, made_
 
 
 def test_runs_that_ended_early_are_drawn_as_far_as_they_got(tmp_path, failed, unfinished):
-    assert len([*figures_of(failed)]) == len(OF_RINGS)
+    assert len(names_for(failed)) == len(OF_RINGS)
     assert len(draw_figures(unfinished, tmp_path)) == len(OF_RINGS)
 
 
@@ -381,8 +383,7 @@ def test_a_structure_without_joints_between_rods_is_told_what_is_not_drawn(
     deployed: xr.Dataset,
 ) -> None:
     planar = deployed.assign_attrs(scene=load_scene("planar-truss").to_toml())
-    drawn = {each.name for each, _ in figures_of(planar)}
-    assert not drawn & {"opening_angles", "ring", "cables"}
+    assert not {*names_for(planar)} & {"opening_angles", "ring", "cables"}
     assert left_out(planar).startswith("not drawn: opening_angles, section_map, ")
     assert left_out(deployed) == ""
 

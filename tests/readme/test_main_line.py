@@ -143,7 +143,9 @@ def test_the_campaign_of_the_main_line_runs(
     text = (ROOT / file).read_text(encoding="utf-8")
     reduced = re.sub(r"samples = \d+", "samples = 2", text)
     assert reduced != text
-    (tmp_path / Path(file).name).write_text(reduced, encoding="utf-8")
+    smaller = reduced.replace('"structure.sections" = 6', '"structure.sections" = 3')
+    assert smaller != reduced
+    (tmp_path / Path(file).name).write_text(smaller, encoding="utf-8")
     done = CliRunner().invoke(cli, [verb, Path(file).name, *options])
     assert done.exit_code == 0, done.output
     (merged,) = tmp_path.rglob("campaign.nc")

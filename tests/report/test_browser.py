@@ -150,6 +150,47 @@ def test_the_page_is_printed_with_what_it_folds(
     ]  # fmt: skip
 
 
+MEASURE = """<script>
+const seen = {boxes: {}, cells: [], room: 0};
+for (const box of document.querySelectorAll(".wide")) {
+  const name = box.querySelector("table").id;
+  seen.boxes[name] = box.scrollWidth - box.clientWidth;
+  seen.room = Math.max(seen.room, box.clientWidth);
+}
+for (const cell of document.querySelectorAll("#failures td")) {
+  if (cell.textContent.length > 40) seen.cells.push(cell.clientWidth);
+}
+seen.wide = document.documentElement.scrollWidth - window.innerWidth;
+document.body.dataset.seen = JSON.stringify(seen);
+</script></body>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
+@pytest.mark.parametrize("width", [1400, 500])
+def test_tables_are_whole_on_a_wide_page_and_scroll_in_their_box_on_a_narrow_one(
+    tmp_path: Path, width: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "PICTURES", figures.PICTURES[:1])
+    campaign = made_campaign(24, failed=(2, 5))
+    campaign["reason"] = campaign["reason"].astype(object)
+    campaign["reason"][2] = "the step fell below its bound at 4 s: " + "set a smaller one, " * 5
+    text = page(campaign, "runs/made").replace("</body>", MEASURE, 1)
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
+         f"--window-size={width},900", f"--user-data-dir={tmp_path / 'profile'}",
+         (tmp_path / "page.html").as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    held = re.search(r'data-seen="([^"]*)"', done.stdout)
+    assert held is not None
+    seen = json.loads(held[1].replace("&quot;", '"'))
+    assert seen["wide"] <= 0
+    assert (seen["boxes"]["statistics-table"] <= 0) == (width == 1400)
+    assert width == 500 or seen["room"] >= 1200  # px: numbers with error bars take 1100
+    assert min(seen["cells"]) >= 200  # px: some words a line
+
+
 def test_without_a_browser_nothing_is_begun(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -19,6 +19,7 @@ from ringsim.analysis.intervals import good
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots.comparison import figures_of_both, pairs, values
+from ringsim.plots.style import in_deg
 from ringsim.report.page import comparison_page
 from ringsim.report.shell import LARGEST
 from ringsim.variables import Fate
@@ -46,6 +47,7 @@ def test_the_page_holds_every_cell_of_the_terminal_and_loads_nothing(
     assert len(read.ids) == len(set(read.ids))
     assert all(load.startswith(("#", "data:image/png;base64,")) for load in read.loads)
     cells = [c for s in sections(found).values() for t in s.tables for r in t.rows for c in r]
+    cells = [in_deg(cell) for cell in cells]
     assert sorted(cells) == sorted(c for c in read.cells if c in cells)
     assert {"figure-differences", "figure-values", "figure-courses"} <= set(read.ids)
     assert "What differs: flight against ground" in text
@@ -281,3 +283,23 @@ def test_distributions_and_requirements_that_differ_are_told(
     assert "input stop.stiffness" not in "\n".join(
         compared(compare(one, asked(both[1], 60.0, 4.0)))
     )
+
+
+def test_of_cases_courses_show_the_base_case_and_the_range(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    design = json.dumps({"kind": "one-at-a-time"})
+    one = both[0].assign_attrs(design=design)
+    found = compare(one, both[1], ("changes", "flight"))
+    (figure,) = (each for name, _, each in figures_of_both(found, one, both[1])
+                 if name == "courses")  # fmt: skip
+    (axes,) = (a for a in figure.axes if "cable" in a.get_ylabel())
+    tension = one["cable_tension"].max(("plane", "span")).transpose("sample", "time").to_numpy()
+    count = len(axes.lines[0].get_xdata())
+    assert axes.lines[0].get_ydata() == pytest.approx(tension[0][:count])
+    held = tension[good(one)][:, :count]
+    edges = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert (edges.min(), edges.max()) == pytest.approx((held.min(), held.max()))
+    told = figure.legends[0].get_title().get_text()
+    assert "Lines are the base case" in told
+    assert "Lines are medians" in told  # those of the other campaign

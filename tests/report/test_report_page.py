@@ -28,6 +28,7 @@ from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots import figures as of_campaigns
 from ringsim.plots.ring import lines_at
+from ringsim.plots.style import in_deg
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.report import page as model
 from ringsim.report import shell, tables
@@ -437,7 +438,28 @@ def test_pages_terminals_and_python_tell_the_same_tables() -> None:
     assert every[0].keys() == campaign.ring.tables().keys()
     for table in every[0].values():
         for row in table.to_numpy().tolist():
-            at = [k for k, cell in enumerate(cells) if cell == row[0]]
-            assert any(cells[k : k + len(row)] == row for k in at), row
+            deg = [in_deg(cell) for cell in row]
+            at = [k for k, cell in enumerate(cells) if cell == deg[0]]
+            assert any(cells[k : k + len(row)] == deg for k in at), row
             assert any(all(cell in line for cell in row) for line in lines) or len(row) == 4, row
+    assert not [cell for cell in cells if "degree" in cell]
     assert "statistic" in every[1]["output"]
+
+
+@pytest.mark.parametrize("kind", ["one-at-a-time", "random"])
+def test_a_table_without_a_figure_of_its_own_goes_before_the_figures(kind: str) -> None:
+    campaign = made_campaign(12)
+    campaign.attrs["design"] = json.dumps({"kind": kind})
+    text = page(campaign, "runs/made")
+    alone = 'id="figure-tornado"' not in text
+    assert alone == (kind == "one-at-a-time")
+    assert text.count('<section id="matters">') == 1
+    assert (text.index('<section id="matters">') < text.index('<section id="figures">')) == alone
+    assert '<p class="note">.</p>' not in text
+
+
+def test_long_heads_may_be_broken_at_underscores() -> None:
+    """Else tables of many outputs are wider than paper, and browsers print all pages smaller."""
+    campaign = made_campaign(4)
+    campaign.attrs["design"] = json.dumps({"kind": "one-at-a-time"})
+    assert '<th scope="col">asynchrony_<wbr>max (deg)</th>' in page(campaign, "runs/made")

@@ -167,7 +167,9 @@ class File:
             codes = [c for c, w in LOSSES.items() if first in ("failed runs", f"failed: {w}")]
             return np.isin(self.values["status"], codes), self.ok | self.lost
         if first.startswith("violates "):
-            (name,) = [n for n in self.wanted if self.text(n) == first.removeprefix("violates ")]
+            told = first.removeprefix("violates ")
+            told += "ree" * told.endswith(" deg")  # as pages say it
+            (name,) = [n for n in self.wanted if self.text(n) == told]
             return self.violating(name), self.ok
         (fate,) = [code for code, word in FATES.items() if word == first]
         return self.ok & (self.values["outcome"] == fate), self.ok

@@ -25,7 +25,7 @@ LAWS = {
 @pytest.mark.parametrize("name", [pytest.param("stall", marks=pytest.mark.slow), *list(LAWS)[1:]])
 def test_both_engines_answer_the_law_alike(name: str) -> None:
     law: dict[str, Any] = LAWS[name]
-    scene = six(cable__winch__winding=law, solver__end_time=1.5, record__interval=0.1)
+    scene = six(cable__winch__winding=law, solver__end_time=0.8, record__interval=0.1)
     full, frame = run(scene), run_frame(scene)
     assert not full.status.failed
     assert not frame.status.failed

@@ -30,7 +30,8 @@ def test_the_quadrature_deploys_in_the_time_asked_for() -> None:
 
 
 def test_the_full_model_with_friction_deploys_in_that_time() -> None:
-    scene = pulled(3, net="none", joints={"vjoint": {"viscous": 0.002}}, rods__damping=0.0)
+    joints = {"vjoint": {"viscous": 0.002}}
+    scene = pulled(3, net="none", joints=joints, rods__damping=0.0, solver__settling_time=0.0)
     found = run(stowed(scene, opening_angle_for(scene, WANTED)))
     assert float(found.values["deployment_time"]) == pytest.approx(WANTED, rel=3e-4)
 

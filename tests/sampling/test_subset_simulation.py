@@ -39,7 +39,7 @@ def design(above, samples=500, replicates=16, **more):
     )
 
 
-@pytest.mark.parametrize("exact", [1e-3, 1e-5])
+@pytest.mark.parametrize("exact", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_a_linear_limit_is_found(exact):
     beta = -norm.ppf(exact)
     found, _ = simulate(design(beta), linear, seed=3)

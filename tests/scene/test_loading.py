@@ -46,7 +46,7 @@ def test_nothing_heavy_is_loaded() -> None:
 @pytest.mark.parametrize(("fidelity", "loaded"), [("full", {"exudyn"}), ("frame", set())])
 def test_a_run_loads_its_own_engine_only(fidelity: str, loaded: set[str], tmp_path: Path) -> None:
     out = str(tmp_path / "run.nc")
-    words = "run", "truss2", "--fidelity", fidelity, "--set", "solver.end_time=0.2", "--out", out
+    words = "run", "truss2", "--fidelity", fidelity, "--set", "solver.end_time=0.1", "--out", out
     assert loaded_by(calling(*words)) & {"exudyn"} == loaded
 
 

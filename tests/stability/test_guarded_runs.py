@@ -63,7 +63,9 @@ def test_too_coarse_steps_are_cured_by_a_new_start() -> None:
 
 def test_constant_steps_that_newton_has_to_cut_are_too_few() -> None:
     """Six that converge until the first lock balance their energy."""
-    outcome = run(ring(step_control="constant", step=3.0).with_values({"loads.force": 10.0}))
+    outcome = run(
+        ring(step_control="constant", step=3.0, restarts=0).with_values({"loads.force": 10.0})
+    )
     assert outcome.status is Status.DIVERGED
     assert word_of(outcome.cause) == "few steps"
     assert float(outcome.values["energy_error"]) < ring().solver.energy_tolerance
@@ -155,15 +157,14 @@ def test_the_jerk_of_a_winch_that_starts_at_once_does_not_depend_on_the_largest_
 
 
 def test_an_error_of_our_own_inside_the_solver_is_not_called_a_failure_of_the_solver() -> None:
-    integration = Integration(build(ring()))
-    steps, accept = integration.history.times, integration._control.accept
+    seen = []
 
-    def broken(*found) -> bool:
-        if len(steps) > 3:
+    def broken(now: object) -> None:
+        seen.append(now)
+        if len(seen) > 3:
             raise KeyError("surprise")
-        return accept(*found)
 
-    integration._control.accept = broken  # type: ignore[method-assign]
+    integration = Integration(build(ring()), broken)
     with pytest.raises(RuntimeError, match="KeyError: 'surprise'"):
         integration.run()
 
@@ -178,7 +179,7 @@ def test_constant_steps_that_miss_a_ropes_swing_are_not_ok(step: float) -> None:
 
 
 def test_constant_steps_that_resolve_it_are() -> None:
-    short = {"solver.end_time": 0.5, "solver.step_control": "constant", "solver.step": 0.0025}
+    short = {"solver.end_time": 0.2, "solver.step_control": "constant", "solver.step": 0.0025}
     outcome = run(load_scene("truss2").with_values(short))
     assert outcome.status is Status.OK  # not "diverged": its reason is the end time
     assert int(outcome.values["restarts"]) == 0

@@ -109,6 +109,7 @@ def test_a_real_run_that_starts_anew_took_more_than_its_last_start() -> None:
     coarse = load_scene("ring18").with_values(
         {"structure.sections": 4, "boom": "none", "solver.step_control": "constant"}
         | {"solver.step": 0.02, "loads.force": 1.0, "solver.restarts": 1}
+        | {"structure.opening_angle": 120.0}
     )
     whole = simulation.run(coarse)
     first = simulation.run(coarse.with_values({"solver.restarts": 0}))

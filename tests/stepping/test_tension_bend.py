@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame
 from ringsim.stepping.instant import Energies, Instant
 from ringsim.stepping.repeats import TensionBend
-from ringsim.variables import Status
+from ringsim.variables import Outcome, Status
 
 SOLVER = Solver(step=0.1, tolerance=2e-3)
 SLACK = 0.05
@@ -82,12 +83,13 @@ def slow_ring(**values: object) -> Scene:
     return load_scene("ring18-cable").with_values(plain | values)
 
 
-def test_the_tension_of_the_last_lock_is_found() -> None:
+@pytest.mark.parametrize("engine", [run_frame, pytest.param(run, marks=pytest.mark.slow)])
+def test_the_tension_of_the_last_lock_is_found(engine: Callable[[Scene], Outcome]) -> None:
     """It rises by 10 N/s there; the energy balance alone let steps of 33 ms cross it.
 
-    The truth is the other engine's, with fine steps.
+    The truth is that of frames, with fine steps.
     """
-    coarse = run(slow_ring())
+    coarse = engine(slow_ring())
     fine = run_frame(slow_ring(**{"solver.tolerance": 3e-4, "solver.step": 0.03}))
     assert coarse.status is fine.status is Status.OK
     peak, truth = (float(one.values["peak_tension"]) for one in (coarse, fine))

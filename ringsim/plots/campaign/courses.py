@@ -15,7 +15,15 @@ from ringsim.analysis.design import judged_by, median_and_worst, told
 from ringsim.analysis.intervals import good
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import head, legend
+from ringsim.plots.campaign.frame import (
+    base_of,
+    entries,
+    head,
+    legend,
+    lines_told,
+    looks_of_cases,
+    of_cases,
+)
 from ringsim.plots.registry import picture
 from ringsim.plots.run import LEAST_SPAN
 
@@ -28,6 +36,8 @@ _WORST: dict[str, Any] = {
 }  # fmt: skip
 """The worst sample: dashes like those of no median, also in grey."""
 _WIDEST = 6
+_MOST_CASES = 60
+"""Lines of a panel at most."""
 
 
 @picture(
@@ -36,7 +46,7 @@ _WIDEST = 6
 )  # fmt: skip
 def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     """A panel a section and plane, one below the other: median, 5-95 % and 0-100 % of its
-    deviation, all with one scale.
+    deviation, or that of each sample where they are cases, all with one scale.
 
     ``campaign`` has ``opening_angle`` (sample, plane, section, time).  The sample with the largest
     asynchrony is drawn on its own.  ``read`` is what ``courses`` gives, if it is there already.
@@ -46,6 +56,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     planes, sections = found["plane"].values.tolist(), found["section"].values.tolist()
     looks = dict(zip(planes, _LOOKS, strict=False))
     worst, one = _worst(campaign, read)
+    cases = _cases(campaign, read, worst)
     columns = min(_WIDEST, len(sections))
     blocks = -(-len(sections) // columns)
     rows = blocks * len(planes)
@@ -66,14 +77,19 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
         own = found.sel(plane=plane, section=sections[number])
         low, lower, middle, upper, high = own.values
         colour, dashes, width = looks[plane]
-        for ends, alpha, edge in (((low, high), 0.08, 0.5), ((lower, upper), 0.2, 0.0)):
-            axes.fill_between(own["time"], *ends, facecolor=(colour, alpha), linewidth=edge,
-                              edgecolor=colour)  # fmt: skip
-        axes.plot(own["time"], middle, color=colour, linewidth=width, linestyle=dashes,
-                  label="median", zorder=4)  # fmt: skip
+        for look, case in cases:
+            axes.plot(case["time"], case.sel(plane=plane, section=sections[number]), **look)
+        if not cases:
+            for ends, alpha, edge in (((low, high), 0.08, 0.5), ((lower, upper), 0.2, 0.0)):
+                axes.fill_between(own["time"], *ends, facecolor=(colour, alpha), linewidth=edge,
+                                  edgecolor=colour)  # fmt: skip
+            axes.plot(own["time"], middle, color=colour, linewidth=width, linestyle=dashes,
+                      label="median", zorder=4)  # fmt: skip
         if one is not None:
             single = one.sel(plane=plane, section=sections[number])
             axes.plot(single["time"], single, zorder=3, **_WORST)
+        if cases and not column:
+            axes.set_ylabel(f"{plane}\nplane", fontsize=8)
         if plane == planes[0]:
             axes.set_title(f"section {sections[number]}", fontsize=9, pad=3)
         if plane == planes[-1] and number + columns >= len(sections):
@@ -92,10 +108,32 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     lines = [Line2D([], [], color=style.GREY, linewidth=1.8, label="median")]
     if one is not None:
         lines += [Line2D([], [], label=f"worst: sample {worst}", **_WORST)]
-    figure.legend(handles=[*words, *bands, *lines], loc="outside lower center", ncols=3)
+    handles: list[Line2D | Patch] = [*words, *bands, *lines]
+    if cases:
+        alike = {look["label"]: look for look, _ in cases}
+        handles = [*(Line2D([], [], **look) for look in alike.values()), *lines[1:]]
+    entries(figure, handles, [str(each.get_label()) for each in handles])
     note = "After its end a deployed ring counts as in step, any other keeps its last deviation."
+    if cases:
+        some = f" {len(cases)} of them are drawn." * (len(cases) < len(read.samples))
+        note = f"{(some + lines_told(campaign)).strip()} {note}"
     head(figure, campaign, "Ahead and behind", f"{told(campaign, len(read.samples))}. {note}")
     return figure
+
+
+def _cases(
+    campaign: xr.Dataset, read: Courses, worst: int
+) -> list[tuple[dict[str, Any], xr.DataArray]]:
+    """Looks and course of each case, evenly spread over all where they are many, with the worst
+    one; empty for samples of a population.
+    """
+    some = read.samples[:: -(-len(read.samples) // _MOST_CASES) or 1]
+    some = np.union1d(some, read.samples[read.samples == worst])
+    looks = looks_of_cases(campaign, some)
+    return [
+        (look, course(campaign, int(sample), read.bands))
+        for look, sample in zip(looks, some, strict=False)
+    ]
 
 
 def _worst(campaign: xr.Dataset, read: Courses) -> tuple[int, xr.DataArray | None]:
@@ -115,18 +153,22 @@ def _limits(drawn: list[xr.DataArray]) -> tuple[float, float]:
 
 
 @picture(
-    "campaign", 60, "Section by time: lag of the median and of the worst sample",
+    "campaign", 60, "Lag of each section over time: the median or base case, and the worst sample",
     _NEEDS, judged_by, courses,
 )  # fmt: skip
 def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     """Deviation from the mean opening angle as a colour: at each place the median of all samples,
-    beside the sample with the largest asynchrony, with one colour scale.  ``read`` is what
-    ``courses`` gives, if it is there already.
+    or the base case of single changes, beside the sample with the largest asynchrony, with one
+    colour scale.  ``read`` is what ``courses`` gives, if it is there already.
     """
     read = courses(campaign) if read is None else read
     found = read.bands
     worst, one = _worst(campaign, read)
     columns = [("median of all samples", read.median)]
+    if of_cases(campaign):
+        base = base_of(campaign)
+        known = base in read.samples and base != worst
+        columns = [("base case", course(campaign, base or 0, found))] if known else []
     if one is not None:
         columns.append((f"worst: sample {worst}", one))
     planes = found["plane"].values.tolist()

@@ -1,6 +1,7 @@
 """Courses by how samples ended: bands, margins, motors, base, tensions."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,8 +15,17 @@ from ringsim.analysis.design import blocks, endings, inputs, paths_of, told, val
 from ringsim.analysis.intervals import good, used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import bands, head, legend, limits, looks_of
-from ringsim.plots.drives_and_locks import least_rate
+from ringsim.plots.campaign.frame import (
+    bands,
+    head,
+    legend,
+    limits,
+    lines_told,
+    looks_of,
+    looks_of_cases,
+    of_cases,
+)
+from ringsim.plots.drives_and_locks import least_rate, standard_of
 from ringsim.plots.registry import picture
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
@@ -23,6 +33,8 @@ from ringsim.plots.registry import picture
 
 MOST = 200
 """Samples of an ending that are read at most, evenly spread over all."""
+Looks = list[dict[str, Any]]
+"""Of the line of each sample, where samples are cases; else empty."""
 
 
 def chosen(campaign: xr.Dataset, names: Sequence[str]) -> tuple[xr.Dataset, NDArray[np.str_]]:
@@ -44,13 +56,22 @@ def counted(campaign: xr.Dataset, words: NDArray[np.str_]) -> str:
     """How many samples hold, how many of them are drawn, and what bands and lines are."""
     count = int(good(campaign).sum())
     drawn = "" if len(words) == count else f" {len(words)} of them are drawn."
-    return (
-        f"{told(campaign, count)}.{drawn} Bands span the samples of an ending, lines are medians."
-    )
+    lines = " Bands span the samples of an ending, lines are medians."
+    if of_cases(campaign):
+        lines = lines_told(campaign)
+    return f"{told(campaign, count)}.{drawn}{lines}"
 
 
-def bands_by_ending(axes: Axes, x: Array, values: Array, words: NDArray[np.str_]) -> None:
-    """Range and median of the curves (sample, x) of each ending, as long as any of them lasts."""
+def bands_by_ending(
+    axes: Axes, x: Array, values: Array, words: NDArray[np.str_], cases: Looks
+) -> None:  # fmt: skip
+    """Range and median of the curves (sample, x) of each ending, as long as any of them lasts; or
+    the curves themselves, of ``cases``.
+    """
+    for row, look in zip(values, cases, strict=False):
+        axes.plot(x, row, **look)
+    if cases:
+        return
     for number, (word, (colour, _)) in enumerate(looks_of(words).items()):
         own = values[words == word]
         own = own[:, known := np.isfinite(own).any(axis=0)]
@@ -65,13 +86,13 @@ def bands_by_ending(axes: Axes, x: Array, values: Array, words: NDArray[np.str_]
 
 def over_time(
     figure: Figure, panels: Sequence[Axes], campaign: xr.Dataset, curves: Sequence[Array],
-    words: NDArray[np.str_],
+    words: NDArray[np.str_], cases: Looks,
 ) -> None:  # fmt: skip
     """A panel a set of curves (sample, time), up to the last time at which any is known."""
     time = campaign["time"].to_numpy()
     last = 0
     for axes, values in zip(panels, curves, strict=True):
-        bands_by_ending(axes, time, values, words)
+        bands_by_ending(axes, time, values, words, cases)
         if (known := np.flatnonzero(np.isfinite(values).any(axis=0))).size:
             last = max(last, int(known[-1]))
     panels[0].set_xlim(time[0], time[max(last, 1)])
@@ -97,7 +118,8 @@ def base_load(campaign: xr.Dataset) -> Figure:
         curves.append(np.linalg.norm(parts.to_numpy(), axis=1))
         axes.set_ylabel(style.label(parts.assign_attrs(long_name=text), width=30))
         style.span_sizes(axes, curves[-1])
-    over_time(figure, panels, read, curves, words)
+    cases = looks_of_cases(campaign, read["sample"].values)
+    over_time(figure, panels, read, curves, words, cases)
     note = f"{counted(campaign, words)} At recorded times: peaks may be higher."
     head(figure, campaign, "What the base carries", note)
     return figure
@@ -126,8 +148,8 @@ def margin(campaign: xr.Dataset) -> Figure:
     rows = [_over_angle(*each) for each in zip(angles, margins, strict=True)]
     grid = angle_grid(rows)
     laid = np.array([laid_on(grid, *row) for row in rows])
-    bands_by_ending(lower, grid, laid, words)
-    style.margin_axis(lower, np.append(laid, values.min()), "Margin of the drive")
+    bands_by_ending(lower, grid, laid, words, looks_of_cases(campaign, read["sample"].values))
+    style.margin_axis(lower, np.append(laid, values.min()), f"Margin by {standard_of(campaign)}")
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
     lower.set_xlabel("Mean opening angle (degree)")
     legend(figure, [lower], 4)
@@ -211,7 +233,8 @@ def motors(campaign: xr.Dataset) -> Figure:
             curves.append(read[what].to_numpy()[:, plane, winch])
             axes.set_title(name, fontsize=9.5)
             axes.set_ylabel(style.label(read[what], width=22), fontsize=9)
-    over_time(figure, grid.ravel().tolist(), read, curves, words)
+    cases = looks_of_cases(campaign, read["sample"].values)
+    over_time(figure, grid.ravel().tolist(), read, curves, words, cases)
     grid[-1, 0].set_xlabel(style.label(read["time"]))
     head(figure, campaign, "Motors", counted(campaign, words))
     return figure
@@ -233,19 +256,25 @@ def lock_impulse(campaign: xr.Dataset) -> Figure:
 
 
 def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.nan) -> Figure:
-    """A panel a plane: median, 5-95 % and 0-100 % over the samples, a place a section."""
+    """A panel a plane, a place a section: median, 5-95 % and 0-100 % over the samples, or the
+    samples themselves where they are cases.
+    """
     held = used(campaign)[name].transpose("sample", "plane", "section")
     planes, sections = held["plane"].values.tolist(), held["section"].values
+    cases = looks_of_cases(campaign, held["sample"].values)
     figure = Figure(figsize=(8.4, 2.1 * len(planes) + 1.4))
     grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for plane, axes in zip(planes, grid, strict=True):
         own = held.sel(plane=plane).to_numpy()
+        for row, look in zip(own, cases, strict=False):
+            axes.plot(sections, row, marker="o", markersize=3, **look)
         known = np.isfinite(own).any(axis=0)
-        low, lower, middle, upper, high = bands(own[:, known])
-        at = sections[known]
-        axes.vlines(at, low, high, color=style.BLUE, linewidth=1.0, label="0-100 %")
-        axes.vlines(at, lower, upper, color=style.SKY, linewidth=5.0, label="5-95 %")
-        axes.plot(at, middle, "o", color=style.INK, markersize=4, label="median")
+        if not cases:
+            low, lower, middle, upper, high = bands(own[:, known])
+            at = sections[known]
+            axes.vlines(at, low, high, color=style.BLUE, linewidth=1.0, label="0-100 %")
+            axes.vlines(at, lower, upper, color=style.SKY, linewidth=5.0, label="5-95 %")
+            axes.plot(at, middle, "o", color=style.INK, markersize=4, label="median")
         if least > 0.0:
             axes.axhline(least, color=style.VERMILLION, linewidth=1.2, linestyle=(0, (5, 2)),
                          label=f"latches catch from {least:.3g} rad/s on")  # fmt: skip
@@ -260,7 +289,7 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
     values = held.to_numpy()
     some = int(np.isfinite(values).any(axis=(1, 2)).sum())
     missing = int(np.isnan(values).sum())
-    note = f"{told(campaign, some)}."
+    note = f"{told(campaign, some)}.{lines_told(campaign) * bool(cases)}"
     if missing:
         note += f" {missing} of {values.size} V-joints of all samples have none."
     head(figure, campaign, subject, note)
@@ -283,7 +312,9 @@ def peaks(campaign: xr.Dataset) -> xr.DataArray:
     ("cable_tension", "final_time", "deployment_time"),
 )  # fmt: skip
 def tension(campaign: xr.Dataset) -> Figure:
-    """A panel a cable: median, 5-95 % and 0-100 % over the samples, from the winch on."""
+    """A panel a cable, from the winch on: median, 5-95 % and 0-100 % over the samples, or the
+    samples themselves where they are cases.
+    """
     found = peaks(campaign)
     planes = [p for p in found["plane"].values.tolist() if found.sel(plane=p).notnull().any()]
     figure = Figure(figsize=(8.4, 2.3 * len(planes) + 1.3))
@@ -292,11 +323,16 @@ def tension(campaign: xr.Dataset) -> Figure:
     for plane, axes in zip(planes, grid, strict=True):
         own = found.sel(plane=plane).transpose("sample", "span")
         own = own.dropna("span", how="all").dropna("sample", how="all")
-        low, lower, middle, upper, high = bands(own.values)
-        look = {"color": style.BLUE, "linewidth": 0.0}
-        axes.fill_between(own["span"], low, high, alpha=0.18, label="0-100 %", **look)
-        axes.fill_between(own["span"], lower, upper, alpha=0.35, label="5-95 %", **look)
-        axes.plot(own["span"], middle, color=style.BLUE, marker="o", markersize=3, label="median")
+        cases = looks_of_cases(campaign, own["sample"].values)
+        for row, case in zip(own.values, cases, strict=False):
+            axes.plot(own["span"], row, marker="o", markersize=3, **case)
+        if not cases:
+            low, lower, middle, upper, high = bands(own.values)
+            look = {"color": style.BLUE, "linewidth": 0.0}
+            axes.fill_between(own["span"], low, high, alpha=0.18, label="0-100 %", **look)
+            axes.fill_between(own["span"], lower, upper, alpha=0.35, label="5-95 %", **look)
+            axes.plot(own["span"], middle, color=style.BLUE, marker="o", markersize=3,
+                      label="median")  # fmt: skip
         if worst in own["sample"]:
             names = f"largest tension: sample {worst}"
             axes.plot(own["span"], own.sel(sample=worst), color=style.INK, linewidth=0.9,
@@ -310,7 +346,8 @@ def tension(campaign: xr.Dataset) -> Figure:
                      fontsize=10.5)  # fmt: skip
     legend(figure, [grid[0]], 4)
     counted = int(np.isfinite(found.to_numpy()).any(axis=(1, 2)).sum())
-    note = f"{told(campaign, counted)}. At recorded times until all V-joints have locked."
+    note = f"{told(campaign, counted)}.{lines_told(campaign) * bool(cases)}"
+    note += " At recorded times until all V-joints have locked."
     head(figure, campaign, "Tension along the cables", note)
     return figure
 

@@ -4,6 +4,7 @@ import itertools
 import re
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,10 +13,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import QUANTILES
-from ringsim.analysis.design import population_of, scalars, values_of
-from ringsim.analysis.intervals import quantities, varies
+from ringsim.analysis.design import (
+    called,
+    endings,
+    inputs,
+    placement,
+    population_of,
+    scalars,
+    values_of,
+)
+from ringsim.analysis.intervals import quantities, used, varies
 from ringsim.analysis.requirements import required_by
-from ringsim.analysis.worst import losses
+from ringsim.analysis.worst import losses, one_at_a_time
 from ringsim.plots import style
 
 LOOKS = {
@@ -122,13 +131,118 @@ def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:
         for axes in panels
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    columns = max(1, min(columns, len(words)))
-    figure.legend(words.values(), words.keys(), loc="outside lower center", ncols=columns)
+    entries(figure, [*words.values()], [*words], columns)
+
+
+def entries(figure: Figure, handles: Sequence[Any], words: Sequence[str], columns: int = 3) -> None:
+    """A legend below the panels, in so many columns at most as the sheet has room for."""
+    longest = max(map(len, words), default=0)
+    fitting = int(figure.get_size_inches()[0] / (_LETTER * longest + _HANDLE))
+    columns = max(1, min(columns, len(words), fitting))
+    figure.legend(handles, words, loc="outside lower center", ncols=columns)
+
+
+_LETTER, _HANDLE = 0.085, 0.65
+"""Widths in inch of a letter of a legend, and of its line and the blanks around it."""
 
 
 def bands(values: NDArray[np.floating]) -> NDArray[np.floating]:
     """``QUANTILES`` over the first axis, NaN left out; shape (5, ...)."""
     return np.asarray(np.nanquantile(values, QUANTILES, axis=0))
+
+
+# Cases that stand for no population: each is drawn, and nothing is told of all of them together.
+
+
+_FEW = 8
+"""Cases up to which each has a colour and a name of its own."""
+_OWN = (style.BLUE, style.ORANGE, style.GREEN, style.VERMILLION, style.PURPLE, style.SKY, "#8c6d31")
+_LONGEST = 26
+"""Letters of the name of a move."""
+
+
+def of_cases(campaign: xr.Dataset) -> bool:
+    """Whether a design chose the samples, which have neither a median nor quantiles then."""
+    placed = placement(campaign)
+    return bool(placed.kind) and not placed.population
+
+
+def base_of(campaign: xr.Dataset) -> int | None:
+    """The base case of a design that changes one input at a time, if it is there and holds."""
+    return 0 if one_at_a_time(campaign) and 0 in used(campaign)["sample"] else None
+
+
+def looks_of_cases(campaign: xr.Dataset, samples: NDArray[np.int64]) -> list[dict[str, Any]]:
+    """How the line of each of some samples looks: heavy that of the base case, thin all others.
+
+    The label is the ending; of few cases the case with its ending.  Empty if the samples stand for
+    a population.
+    """
+    if not of_cases(campaign):
+        return []
+    at = np.searchsorted(campaign["sample"].to_numpy(), samples)
+    ends, base, few = endings(campaign)[at], base_of(campaign), len(samples) <= _FEW
+    shown, own, found = looks_of(ends), itertools.cycle(_OWN), list[dict[str, Any]]()
+    single = one_at_a_time(campaign)
+    words = moves(campaign)[0] if few and single else [""] * campaign.sizes["sample"]
+    for place, sample, end in zip(at.tolist(), samples.tolist(), ends.tolist(), strict=True):
+        if sample == base:
+            look = {"color": style.INK, "linewidth": 2.4, "zorder": 3.5}
+            found.append(look | {"label": f"base case ({end})"})
+        elif few:
+            name = short(words[place]) if single else f"sample {sample}"
+            look = {"color": next(own), "linewidth": 1.2, "zorder": 3}
+            found.append(look | {"label": f"{style.plain(name)} ({end})"})
+        else:
+            look = {"color": shown[end][0], "linewidth": 0.7, "alpha": 0.7, "zorder": 3}
+            found.append(look | {"label": f"{end} ({(ends == end).sum()})"})
+    return found
+
+
+def lines_told(campaign: xr.Dataset) -> str:
+    """What the lines of cases are, as a sentence."""
+    heavy = ", the heavy one the base case" if base_of(campaign) is not None else ""
+    return f" Each line is one sample{heavy}."
+
+
+def moves(campaign: xr.Dataset) -> tuple[list[str], list[str]]:
+    """Of each sample what it has other than the first one, in words, and the input that moved;
+    "base" and "" of the first.
+    """
+    count = campaign.sizes["sample"]
+    found, moved = [list[str]() for _ in range(count)], [""] * count
+    for name in inputs(campaign):
+        values = campaign[name].to_numpy()
+        rows = values.reshape(len(values), -1)
+        for sample, place in zip(*np.nonzero(rows != rows[0]), strict=True):
+            one, base = rows[sample, place], rows[0, place]
+            found[sample].append(_word(campaign[name], one, base, int(place)))
+            moved[sample] = name
+    return [", ".join(words) or "base" for words in found], moved
+
+
+def _word(variable: xr.DataArray, value: object, base: object, place: int) -> str:
+    """The place of an input of many; of a single one the last part of its path with the value, of
+    a table with what in it is new.
+    """
+    if variable.ndim > 1:
+        dim = str(variable.dims[1])
+        named = f"{dim}_name" if f"{dim}_name" in variable.coords else dim
+        if named in variable.coords:
+            return str(variable[named].values[place])
+        return f"{dim} {place + 1}"
+    last = called(variable).rpartition(".")[2]
+    if isinstance(value, float):
+        return f"{last} {value:.4g}"
+    old = set(re.split(r"[(),]+ ?", str(base)))
+    new = [word for word in re.split(r"[(),]+ ?", str(value)) if word and word not in old]
+    return f"{last} {', '.join(new) or value}"
+
+
+def short(name: str) -> str:
+    """A name without its middle if it is long: moves of one input differ at the end."""
+    half = (_LONGEST - 3) // 2
+    return name if len(name) <= _LONGEST else f"{name[:half]}...{name[-half:]}"
 
 
 # Names of inputs in the width that figures have for them.

@@ -37,6 +37,7 @@ from ringsim.plots.campaign.frame import (
     legend,
     limits,
     looks_of,
+    of_cases,
     shown,
     standing,
 )
@@ -75,7 +76,8 @@ def points(values: Array, of: int) -> tuple[Array, Array]:
     "campaign", 30, "Cumulative distribution of each main number, with its limits", applies=_spread
 )
 def distributions(campaign: xr.Dataset) -> Figure:
-    """Share of the samples at or below each value, a step a sample; dots at 5, 50 and 95 %.
+    """Share of the samples at or below each value, a step a sample; dots at 5, 50 and 95 % of those
+    of a population.
 
     Samples whose run ended before what a number is about happened count, too, as they do in
     verdicts: their curve ends below 100 %.
@@ -92,7 +94,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
         kept = np.unique(np.linspace(0, len(values) - 1, min(len(values), _STEPS)).astype(int))
         axes.step(np.append(values[:1], values[kept]), np.append(0.0, share[kept]), where="post",
                   color=style.BLUE)  # fmt: skip
-        if len(values) > 1:
+        if len(values) > 1 and not of_cases(campaign):
             axes.plot(*points(values, of), "o", color=style.INK, markersize=4, clip_on=False,
                       zorder=4)  # fmt: skip
         for word, limit in limits(campaign, name):
@@ -112,11 +114,12 @@ def distributions(campaign: xr.Dataset) -> Figure:
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
     most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
-    notes = f" Dots: quantiles of 5, 50 and 95 %.{blocks}{flat}"
+    dots = "" if of_cases(campaign) else " Dots: quantiles of 5, 50 and 95 %."
+    notes = f"{dots}{blocks}{flat}"
     if short:
         notes += (
             " Where a curve ends below 100 %, it did not happen in the other samples: they count "
-            "in shares and dots, and violate limits."
+            "as beyond all values, and violate limits."
         )
     head(figure, campaign, "Distributions", f"{told(campaign, most)}.{notes}")
     return figure

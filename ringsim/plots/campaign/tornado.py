@@ -1,7 +1,6 @@
 """Which inputs matter for the main numbers: tornado, and single changes."""
 
 import itertools
-import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -13,7 +12,6 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.design import (
-    called,
     drawn,
     endings,
     inputs,
@@ -30,8 +28,9 @@ from ringsim.analysis.intervals import quantities, ran, varies
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
+from ringsim.analysis.worst import one_at_a_time
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import MOST_PANELS, head, in_lines, legend, looks_of
+from ringsim.plots.campaign.frame import MOST_PANELS, head, in_lines, legend, looks_of, moves, short
 from ringsim.plots.registry import picture
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted, unit_behind
@@ -180,8 +179,8 @@ def _bars(
 
 
 def explained(campaign: xr.Dataset) -> bool:
-    """Whether there is something to draw: drawn inputs, enough samples for a correlation, and no
-    chains of them.
+    """Whether there is something to draw: drawn inputs, enough samples for a correlation, and
+    neither chains of them nor single changes, which are told case by case.
 
     Told without the analysis itself, which takes a while for many samples.
     """
@@ -190,7 +189,8 @@ def explained(campaign: xr.Dataset) -> bool:
         len(values_of(stand, name)[1]) >= LEAST and varies(stand, name)
         for name in scalars(campaign)
     )
-    return varied and bool(drawn(campaign).names) and subset_simulation(campaign.attrs) is None
+    told_apart = one_at_a_time(campaign) or subset_simulation(campaign.attrs) is not None
+    return varied and bool(drawn(campaign).names) and not told_apart
 
 
 @picture(
@@ -294,8 +294,6 @@ def _row(
 
 _MOST_NAMED = 72
 """Moves up to which each has its name on the axis."""
-_WIDEST = 26
-"""Letters of such a name."""
 _LEAST_SPAN = 0.02
 """Of its largest value: axes of smaller ranges are made to span twice as much."""
 
@@ -304,22 +302,6 @@ def is_one_by_one(campaign: xr.Dataset) -> bool:
     """Whether inputs were moved one at a time, and something came of it."""
     kind = placement(campaign).kind
     return kind == "one-at-a-time" and bool(scalars(campaign)) and bool(inputs(campaign))
-
-
-def moves(campaign: xr.Dataset) -> tuple[list[str], list[str]]:
-    """Of each sample what it has other than the first one, in words, and the input that moved;
-    "base" and "" of the first.
-    """
-    count = campaign.sizes["sample"]
-    found, moved = [list[str]() for _ in range(count)], [""] * count
-    for name in inputs(campaign):
-        values = campaign[name].to_numpy()
-        rows = values.reshape(len(values), -1)
-        for sample, place in zip(*np.nonzero(rows != rows[0]), strict=True):
-            one, base = rows[sample, place], rows[0, place]
-            found[sample].append(_word(campaign[name], one, base, int(place)))
-            moved[sample] = name
-    return [", ".join(words) or "base" for words in found], moved
 
 
 def _scaled(campaign: xr.Dataset, name: str, samples: NDArray[np.int64]) -> bool:
@@ -339,30 +321,6 @@ def named(count: int) -> list[int]:
     return [*range(0, count - 1 - step // 2, step), count - 1]
 
 
-def _word(variable: xr.DataArray, value: object, base: object, place: int) -> str:
-    """The place of an input of many; of a single one the last part of its path with the value, of
-    a table with what in it is new.
-    """
-    if variable.ndim > 1:
-        dim = str(variable.dims[1])
-        named = f"{dim}_name" if f"{dim}_name" in variable.coords else dim
-        if named in variable.coords:
-            return str(variable[named].values[place])
-        return f"{dim} {place + 1}"
-    last = called(variable).rpartition(".")[2]
-    if isinstance(value, float):
-        return f"{last} {value:.4g}"
-    old = set(re.split(r"[(),]+ ?", str(base)))
-    new = [word for word in re.split(r"[(),]+ ?", str(value)) if word and word not in old]
-    return f"{last} {', '.join(new) or value}"
-
-
-def _cut(name: str) -> str:
-    """A name without its middle if it is long: moves of one input differ at the end."""
-    half = (_WIDEST - 3) // 2
-    return name if len(name) <= _WIDEST else f"{name[:half]}...{name[-half:]}"
-
-
 @picture("campaign", 20, "Main numbers after each single change", applies=is_one_by_one)
 def one_by_one(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a mark a move in the order of the design; the line is the base case.
@@ -372,7 +330,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     names, ends = scalars(campaign), endings(campaign)
     words, moved = moves(campaign)
     samples, has_run = campaign["sample"].to_numpy(), ran(campaign)
-    figure = Figure(figsize=(9.6, 1.75 * len(names) + 2.4))
+    figure = Figure(figsize=(9.6, 1.4 * len(names) + 2.4))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     looks = looks_of(ends)
     for axes, name in zip(panels, names, strict=True):
@@ -401,7 +359,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
         title = unit_behind(str(says.get("long_name", name)), str(says.get("units", "1")))
         axes.set_title(title, fontsize=9.5)
     places = named(len(samples))
-    names_shown = [_cut(words[k]) for k in places]
+    names_shown = [short(words[k]) for k in places]
     panels[-1].set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
     panels[-1].set_xlim(-0.7, len(samples) - 0.3)
     legend(figure, [panels[0]], 4)
