@@ -146,7 +146,7 @@ def test_failures_and_violations_have_their_replay_commands(
     assert {f"ringsim replay 'runs/made here' {k}" for k in wanted} <= commands
     assert len(violating) == (0 if kind == "lost" else 3)
     # Whatever fell short or violates something is told, and no sentence denies it.
-    assert ("Every sample that has run reached its goal" in text) == (kind == "good")
+    assert ("No run ended short of its goal" in text) == (kind == "good")
     assert ("but not all keep to what is required" in " ".join(text.split())) == (kind == "good")
     names = re.findall(r"<h3>(Violates .*|Stalled .*|Failed: .*)</h3>", text)
     assert len(names) == {"good": 1, "mixed": 3, "lost": 1}[kind]
