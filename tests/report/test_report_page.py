@@ -147,7 +147,7 @@ def test_failures_and_violations_have_their_replay_commands(
     assert len(violating) == (0 if kind == "lost" else 3)
     # Whatever fell short or violates something is told, and no sentence denies it.
     assert ("No run ended short of its goal" in text) == (kind == "good")
-    assert ("but not all keep to what is required" in " ".join(text.split())) == (kind == "good")
+    assert ("those above violate a requirement" in " ".join(text.split())) == (kind == "good")
     names = re.findall(r"<h3>(Violates .*|Stalled .*|Failed: .*)</h3>", text)
     assert len(names) == {"good": 1, "mixed": 3, "lost": 1}[kind]
     for k in KINDS[kind].get("failed", ()):
