@@ -11,6 +11,7 @@ import xarray as xr
 from ringsim.analysis.design import placement, population_of
 from ringsim.analysis.intervals import (
     CHECKED,
+    NOTHING,
     ROUND_OFF,
     Mask,
     good,
@@ -57,7 +58,8 @@ class Difference:
     @property
     def listed(self) -> bool:
         """Whether tables tell of it: sizes that differ by more than rounding."""
-        return not is_moment(self.name) and bool((self.share > ROUND_OFF).any())
+        apart = (self.share > ROUND_OFF) & (self.apart > NOTHING)
+        return not is_moment(self.name) and bool(apart.any())
 
 
 def differences(campaign: xr.Dataset) -> list[Difference]:

@@ -173,7 +173,8 @@ def _with_interval(middle: Array, ends: Array, k: int) -> tuple[str, str]:
 _MOST = 5
 """Groups or inputs that are told for each output."""
 _TELLING = 5
-"""Samples without a value from which on their inputs can be told from those of the others."""
+"""Samples without a value from which on it is said that they depend on no input: four lie in the
+same half of an input by chance once in 8, five once in 16."""
 _MOST_PLACES = 3
 _SLACK = 0.05
 """How far Sobol' indices may lie above what is possible before that is told."""

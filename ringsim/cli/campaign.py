@@ -260,7 +260,7 @@ def judged(different: list[str], new: Arrays, old: Arrays, bars: Arrays) -> list
         if name in bars:
             told = f"{name} by {np.nanmax(apart):.2g} of {np.nanmax(bars[name]):.2g}"
             unit = unit_text(VARIABLES[name].units)
-            (beyond if np.any(apart > bars[name]) else within).append(f"{told} {unit}")
+            (beyond if np.any(apart > bars[name]) else within).append(f"{told} {unit}".rstrip())
     lines = []
     if sizes:
         most = max(sizes, key=sizes.__getitem__)

@@ -28,6 +28,7 @@ from ringsim.plots.run import LEAST_SPAN
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
 from ringsim.shapes import ByLine, Shape, shape_of
+from ringsim.tables import unit_text
 
 COLOURS = ("lag", "stress")
 FRAMES, RATE, HELD = 120, 15, 1.5
@@ -183,7 +184,7 @@ def by_lag(run: xr.Dataset, shape: Shape) -> _Paint:
     angle = run["opening_angle"]
     apart = abs(angle - angle.mean(["plane", "section"])).max(["plane", "section"])
     span = max(float(apart.max()), LEAST_SPAN)
-    units = style.in_deg(str(angle.attrs.get("units", "degree")))
+    units = unit_text(str(angle.attrs.get("units", "degree")))
     words = "largest deviation of an opening angle from the mean"
     # Deviations are small until the first joints lock: colours go with their square roots.
     bent = FuncNorm(

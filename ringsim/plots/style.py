@@ -186,7 +186,7 @@ def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
 
 
 def in_readable_units(figure: Figure) -> None:
-    """Let the axes and words of a figure give stress, in SI, and angles as people read them."""
+    """Let the axes and words of a figure of SI values give stress as people read it."""
     for axes, side in product(figure.axes, ("x", "y")):
         axis: Axis = getattr(axes, f"{side}axis")
         beside = getattr(figure, f"get_sup{side}label")()
@@ -196,16 +196,7 @@ def in_readable_units(figure: Figure) -> None:
             axis.set_minor_formatter(NullFormatter())
             axis.set_label_text(axis.get_label_text().replace(_PASCAL, f"({units})"))
     for text in figure.findobj(Text):
-        text.set_text(in_deg(text.get_text().replace(_PASCAL, "(MPa)")))
-
-
-def in_deg(text: str) -> str:
-    """Words with the unit of angles as people write it; files hold "degree".
-
-    >>> in_deg("at most 3 degree"), in_deg("27 degrees of freedom")
-    ('at most 3 deg', '27 degrees of freedom')
-    """
-    return re.sub(r"\bdegrees?\b(?! of freedom)", "deg", text)
+        text.set_text(text.get_text().replace(_PASCAL, "(MPa)"))
 
 
 _PASCAL = "(Pa)"

@@ -13,7 +13,6 @@ from ringsim.analysis.intervals import used
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.points import points_of
 from ringsim.plots.campaign.frame import base_of, of_cases
-from ringsim.plots.style import in_deg
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import COMPUTED, FROM_ANGLES, middle_of
 
@@ -75,7 +74,7 @@ def _chosen(campaign: xr.Dataset, analysis: xr.Dataset) -> list[tuple[int, str]]
             own += [each for each in failure.split("; ") if each.startswith(violating)]
     ends = dict(zip(samples.tolist(), words.tolist(), strict=True))
     return [
-        (sample, in_deg(f"sample {sample}: {', '.join([*word, ends[sample]])}"))
+        (sample, f"sample {sample}: {', '.join([*word, ends[sample]])}")
         for sample, word in found.items() if _recorded(campaign, sample)
     ]  # fmt: skip
 

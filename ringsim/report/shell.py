@@ -12,7 +12,7 @@ import jinja2
 from markupsafe import Markup
 
 from ringsim.files import whole, writing
-from ringsim.plots.style import HEAVY, Inline, in_deg
+from ringsim.plots.style import HEAVY, Inline
 from ringsim.refusal import InputError
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def written(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    shell.filters |= {"sentence": _sentence, "deg": in_deg, "head": _head}
+    shell.filters |= {"sentence": _sentence, "head": _head}
     shape, text = shell.get_template(template), ""
     each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
@@ -55,7 +55,6 @@ def _sentence(line: str) -> str:
     """A line of a terminal as a sentence: with a capital, unless a name begins it."""
     first = line.split(maxsplit=1)[0] if line else ""
     named = not first.isalpha() or first != first.lower()
-    line = in_deg(line)
     return f"{line if named else line[0].upper() + line[1:]}."
 
 
@@ -63,7 +62,7 @@ def _head(text: str) -> Markup:
     """The head of a column, which may be broken at underscores: a table that is wider than the
     paper makes browsers print all pages smaller.
     """
-    return Markup("_<wbr>").join(in_deg(text).split("_"))
+    return Markup("_<wbr>").join(text.split("_"))
 
 
 _BROWSERS = "chromium", "chromium-browser", "google-chrome"

@@ -122,9 +122,10 @@ def test_limits_that_a_run_passes_are_told_with_value_and_time() -> None:
     assert np.isfinite(limited.values["deployment_time"])
 
 
-def test_the_stress_has_a_limit_too() -> None:
+@pytest.mark.parametrize("engine", ["frame", "full"])
+def test_the_stress_has_a_limit_too(engine: str) -> None:
     found = uneven(
-        "stop", "frame", record__stress=True, limits__rod_stress=1e3, solver__end_time=0.3
+        "stop", engine, record__stress=True, limits__rod_stress=1e3, solver__end_time=0.3
     )
     assert found.fate is Fate.OVERLOADED
     assert "more than limits.rod_stress = 0.001 MPa" in found.reason

@@ -68,7 +68,8 @@ def test_poisoned_samples_are_kept_with_their_reason(poisoned, healthy):
     )
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow  # of healthy samples: test_campaign_identity.py; of poison without MPI: above
+@pytest.mark.parametrize("ranks", [2, 3])
 def test_poison_gives_the_same_file_under_mpi(ranks, bench, poisoned, mpi):
     file = bench.write_listed(ways(), more=LIMITS)
     bench.run("campaign", file, "--out", "out", solver="fake_solver:poisoned", ranks=ranks)

@@ -189,6 +189,7 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     assert time_left(checked, left, np.zeros(2), 2) == "not known yet"
 
 
+@pytest.mark.slow  # a signal to one rank, test_campaign_together.py, goes the same way
 def test_stop_signal_reaches_all_ranks(bench, mpi):
     start = ("campaign", bench.write(40, **SLEEPY), "--out", "out")
     process = bench.start(*start, ranks=2, solver="fake_solver:slow")

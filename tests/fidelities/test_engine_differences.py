@@ -55,6 +55,22 @@ def test_only_samples_that_ended_well_with_both_count() -> None:
     assert found.standard_error == pytest.approx(np.std([10, 11, 12, 13], ddof=1) / 2.0)
 
 
+@pytest.mark.parametrize(
+    ("checked", "listed"),
+    [([10.0 + 1e-13, 11.0], False), ([10.0, 11.0 + 1e-6], True), ([NAN, 11.0], True)],
+)
+def test_what_rounding_leaves_is_not_listed(checked: list[float], listed: bool) -> None:
+    (found,) = differences(campaign(deployment_time_checked=[*checked, NAN, NAN]))
+    assert found.listed == listed
+
+
+def test_rounding_of_zero_is_not_listed() -> None:
+    """Its share of the other engine's value is infinite."""
+    values = {"deployment_time": [1e-17, 11.0, 1.0, 1.0]}
+    (found,) = differences(campaign(**values, deployment_time_checked=[0.0, 11.0, NAN, NAN]))
+    assert not found.listed
+
+
 def test_standard_errors_are_those_of_the_design() -> None:
     def of(**design: object) -> float:
         return differences(campaign().assign_attrs(design=json.dumps(design)))[0].standard_error

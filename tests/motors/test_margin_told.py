@@ -139,4 +139,4 @@ def test_a_run_draws_what_resists_and_its_least_margin(
     assert np.allclose(available, found.drive_available.dropna("time"))
     assert np.all(np.diff(angles) >= 0.0)
     words = " ".join(text.get_text() for text in lower.texts)
-    assert f"least margin {float(found.least_drive_margin):.2f}" in words
+    assert f"least margin {float(found.least_drive_margin):.3f}" in words

@@ -158,7 +158,7 @@ for (const box of document.querySelectorAll(".wide")) {
   seen.room = Math.max(seen.room, box.clientWidth);
 }
 for (const cell of document.querySelectorAll("#failures td")) {
-  if (cell.textContent.length > 40) seen.cells.push(cell.clientWidth);
+  if (cell.textContent.length > 60) seen.cells.push(cell.clientWidth);
 }
 seen.wide = document.documentElement.scrollWidth - window.innerWidth;
 document.body.dataset.seen = JSON.stringify(seen);

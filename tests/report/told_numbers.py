@@ -168,7 +168,6 @@ class File:
             return np.isin(self.values["status"], codes), self.ok | self.lost
         if first.startswith("violates "):
             told = first.removeprefix("violates ")
-            told += "ree" * told.endswith(" deg")  # as pages say it
             (name,) = [n for n in self.wanted if self.text(n) == told]
             return self.violating(name), self.ok
         (fate,) = [code for code, word in FATES.items() if word == first]

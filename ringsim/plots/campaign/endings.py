@@ -151,7 +151,7 @@ def margin(campaign: xr.Dataset) -> Figure:
     bands_by_ending(lower, grid, laid, words, looks_of_cases(campaign, read["sample"].values))
     style.margin_axis(lower, np.append(laid, values.min()), f"Margin by {standard_of(campaign)}")
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
-    lower.set_xlabel("Mean opening angle (degree)")
+    lower.set_xlabel("Mean opening angle (deg)")
     legend(figure, [lower], 4)
     note = f"{counted(campaign, words)} Dashed: the margin of 0 that the standard requires."
     head(figure, campaign, "Drive margin", note)
