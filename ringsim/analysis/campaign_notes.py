@@ -9,7 +9,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.design import LOST, NOT_RUN, REACHED, UNKNOWN, endings_of, kinds_of_ends
+from ringsim.analysis.design import (
+    LOST,
+    NOT_RUN,
+    REACHED,
+    UNKNOWN,
+    called,
+    distribution_of,
+    endings_of,
+    inputs,
+    kinds_of_ends,
+)
 from ringsim.analysis.intervals import good, used, worst_sample
 from ringsim.analysis.worst import losses
 from ringsim.outputs import OUTPUTS
@@ -24,9 +34,24 @@ _LONGEST = 200
 
 
 def notes(campaign: xr.Dataset) -> list[str]:
-    """What became of the antenna, the largest values, runs that were repeated, and remarks."""
-    parts = (outcome_lines, peak_lines, override_lines, restart_lines, remark_lines)
+    """What the inputs rest on, what became of the antenna, the largest values, runs that were
+    repeated, and remarks.
+    """
+    parts = (learnt_lines, outcome_lines, peak_lines, override_lines, restart_lines, remark_lines)
     return [line for part in parts for line in part(campaign)]
+
+
+def learnt_lines(campaign: xr.Dataset) -> list[str]:
+    """Which inputs are drawn from what a test has told, a line a test."""
+    found: dict[str, list[str]] = {}
+    for name in inputs(campaign):
+        says = distribution_of(campaign[name])
+        if "remaining_scatter" in says:
+            found.setdefault(str(says.get("data", "")), []).append(called(campaign[name]))
+    return [
+        f"learnt from the test {test}: {', '.join(dict.fromkeys(names))}"
+        for test, names in found.items()
+    ]
 
 
 def outcome_lines(campaign: xr.Dataset) -> list[str]:

@@ -88,28 +88,45 @@ def _of(run: xr.Dataset, readings: Readings) -> Residuals:
     return Residuals(readings, at[inside], readings.values[inside], computed, int((~inside).sum()))
 
 
-def predictions(campaign: xr.Dataset, measurement: Measurement) -> list[Array]:
+def predictions(
+    campaign: xr.Dataset, measurement: Measurement, offset: Array | None = None,
+    drift: Array | None = None,
+) -> list[Array]:  # fmt: skip
     """What each sensor would read in each run of a campaign, shape (samples, readings) each, in the
     variable's units; NaN where a run has no value.
 
-    Runs end once an antenna is deployed: its joints stay where they locked.
+    ``offset`` (s) and ``drift`` of the clock in each run, shape (samples,), take the place of the
+    measured file's.  Runs end once an antenna is deployed: its joints stay where they locked.
     """
+    clock, samples = measurement.file.clock, campaign.sizes["sample"]
+    known = (0.0, 0.0) if clock is None else (clock.offset, clock.drift)
+    starts, rates = (np.full(samples, was) if now is None else now
+                     for was, now in zip(known, (offset, drift), strict=True))  # fmt: skip
+    # From the time of the run by the file's clock to that by each run's own, t' = shift + scale t.
+    scale = (1.0 + rates) / (1.0 + known[1])
+    shift = starts - known[0] * scale
     stays = np.isin(campaign["outcome"].to_numpy(), [int(goal) for goal in GOALS])
     found = []
     for readings in measurement.readings:
         values = _at_place(campaign, readings)
         if "time" not in values.dims:
-            found.append(values.to_numpy()[:, None])
+            each, name = values.to_numpy().astype(float), readings.sensor.variable
+            if VARIABLES[name].units == "s" and clock is not None:
+                # Back to what the file's clock would have shown of an instant, or of a duration.
+                each = (each - shift * name.endswith("_time")) / scale
+            found.append(each[:, None])
             continue
         times, rows = values["time"].to_numpy(), values.transpose("sample", "time").to_numpy()
         holds = stays & (readings.sensor.variable == "opening_angle")
-        found.append(np.array([_at(readings.times, times, row, holds=hold)
-                               for row, hold in zip(rows, holds, strict=True)]))  # fmt: skip
+        found.append(np.array([
+            _at(shift[k] + scale[k] * readings.times, times, row, holds=bool(holds[k]))
+            for k, row in enumerate(rows)
+        ]))  # fmt: skip
     return found
 
 
 def _at(wanted: Array, times: Array, values: Array, *, holds: bool) -> Array:
-    """Values at other times, by lines; NaN before the first and, unless it holds, after the last."""
+    """Values at other times, by lines; NaN before the first and after the last, unless it holds."""
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(wanted), np.nan)

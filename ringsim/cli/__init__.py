@@ -33,6 +33,7 @@ VERBS = {
     "compare": "Compare two campaigns, or two runs.",
     "replay": "Run one sample of a campaign again.",
     "calibrate": "Find unknown inputs from measured data.",
+    "sensors": "Tell before a test how much each sensor would tell.",
     "stability": "Map which settings the solver can run, and how other runs end.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",
 }
@@ -40,7 +41,7 @@ VERBS = {
 _FILES = {
     "scene": ("scenes", "check", "explain"),
     "run": ("run",),
-    "studies": ("accuracy", "stability", "calibrate"),
+    "studies": ("accuracy", "stability", "calibrate", "sensors"),
     "campaign": ("campaign", "status", "replay"),
     "results": ("merge", "analyse", "report", "plot", "compare", "export"),
 }

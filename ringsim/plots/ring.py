@@ -17,8 +17,8 @@ from scipy.constants import kilogram_force
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
 from ringsim.plots import style
-from ringsim.plots.peaks import Peak, peak_of
 from ringsim.plots.registry import jointed, picture
+from ringsim.plots.run import Peak, peak_of
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import Shape, Track, places_at, shape_of
 

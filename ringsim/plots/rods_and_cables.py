@@ -17,8 +17,8 @@ from ringsim.cable.records import Cable
 from ringsim.layout.bodies import JointOpening, OnRod
 from ringsim.layout.layout import layout_of
 from ringsim.plots import style
-from ringsim.plots.peaks import mark, peak_of
 from ringsim.plots.registry import barred, jointed, picture
+from ringsim.plots.run import mark, peak_of
 from ringsim.scene import Scene, scene_from_toml
 
 _LOOKS: tuple[tuple[str, Any], ...] = (

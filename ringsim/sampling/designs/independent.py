@@ -209,40 +209,6 @@ class Listed(Design):
         return columns
 
 
-class FromPosterior(Listed):
-    """The samples of a posterior, as ``ringsim calibrate`` writes it, with their correlations."""
-
-    population: ClassVar[bool] = True
-    independent: ClassVar[bool] = True
-
-    kind: Literal["posterior"] = "posterior"  # type: ignore[assignment]
-    samples: Samples | None = None
-    """The first so many; left out, all."""
-
-    def table(
-        self, factors: Factors, correlations: Sequence[Correlation], *, seed: int, folder: Path
-    ) -> dict[str, Values]:
-        """Values by path; see :meth:`Design.table`."""
-        found = super().table(factors, correlations, seed=seed, folder=folder)
-        import netCDF4
-
-        stands = False
-        if self.file.endswith(".nc"):
-            with netCDF4.Dataset(folder / self.file) as file:
-                stands = bool(getattr(file, "population", 0))
-        if not stands:
-            raise InputError(
-                f"design.file = {self.file}: is no posterior: give the posterior.nc of ringsim "
-                'calibrate, or take kind = "list"'
-            )
-        there = len(next(iter(found.values())))
-        if self.samples is not None and self.samples > there:
-            raise InputError(
-                f"design.samples = {self.samples}: {self.file} has {there}: ask for no more"
-            )
-        return {path: values[: self.samples] for path, values in found.items()}
-
-
 def _from_csv(path: Path) -> dict[str, Values]:
     lines = csv.reader(read_text(path).splitlines())
     rows = [[word.strip() for word in row] for row in lines if row]
