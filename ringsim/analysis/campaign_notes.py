@@ -14,11 +14,9 @@ from ringsim.analysis.design import (
     NOT_RUN,
     REACHED,
     UNKNOWN,
-    called,
-    distribution_of,
     endings_of,
-    inputs,
     kinds_of_ends,
+    learnt_lines,
 )
 from ringsim.analysis.intervals import good, used, worst_sample
 from ringsim.analysis.worst import losses
@@ -39,19 +37,6 @@ def notes(campaign: xr.Dataset) -> list[str]:
     """
     parts = (learnt_lines, outcome_lines, peak_lines, override_lines, restart_lines, remark_lines)
     return [line for part in parts for line in part(campaign)]
-
-
-def learnt_lines(campaign: xr.Dataset) -> list[str]:
-    """Which inputs are drawn from what a test has told, a line a test."""
-    found: dict[str, list[str]] = {}
-    for name in inputs(campaign):
-        says = distribution_of(campaign[name])
-        if "remaining_scatter" in says:
-            found.setdefault(str(says.get("data", "")), []).append(called(campaign[name]))
-    return [
-        f"learnt from the test {test}: {', '.join(dict.fromkeys(names))}"
-        for test, names in found.items()
-    ]
 
 
 def outcome_lines(campaign: xr.Dataset) -> list[str]:

@@ -246,7 +246,8 @@ def head_lines(analysis: xr.Dataset) -> list[str]:
     counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts]
-    lines += [*filter(None, [analysis.attrs[NOTE]]), analysis.attrs["intervals"]]
+    told = (analysis.attrs.get("learnt", ""), analysis.attrs[NOTE], analysis.attrs["intervals"])
+    lines += filter(None, told)
     if "tail_probability" in analysis:
         lines.append(
             "no sensitivity to inputs is given: samples of subset simulation depend on each "

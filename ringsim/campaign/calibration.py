@@ -466,10 +466,11 @@ def _write_posterior(course: _Course) -> None:
 
 
 def _moved(axis: Axis, mean: float, deviation: float, test: str) -> Calibrated:
-    """The prior of an axis moved and narrowed; one that was moved before, by both tests together."""
-    law, shift, scatter = axis.law, 0.0, 1.0
-    if isinstance(law, Calibrated):
-        law, shift, scatter, test = law.of, law.shift, law.remaining_scatter, f"{law.data}, {test}"
+    """The prior of an axis moved and narrowed; of one that an earlier test has moved, by both."""
+    law, shift, scatter, before = axis.law, 0.0, 1.0, axis.law
+    if isinstance(before, Calibrated):
+        law, shift, scatter = before.of, before.shift, before.remaining_scatter
+        test = f"{before.data}, {test}"
     assert isinstance(law, Ranged)  # as Unknowns.of has seen
     return Calibrated(
         of=law, shift=shift + scatter * mean, remaining_scatter=scatter * deviation, data=test,
