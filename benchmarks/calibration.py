@@ -1,7 +1,7 @@
 """Are the intervals of a calibration honest?  Tests made by runs of known truth.
 
-Run: python benchmarks/calibration.py [--kind coverage | bad | sound | wrong] [--first N]
-         [--tests N] [--runs N] [--file F]
+Run: python benchmarks/calibration.py [--kind coverage | bad | sound | wrong | flight]
+         [--first N] [--tests N] [--runs N] [--file F]
 
 Each test is of a ring of six sections with two cables: truths are drawn from the priors, a run of
 the frame engine with them is read by an encoder of 0.1 deg in every V-joint at 2 Hz, and
@@ -16,6 +16,9 @@ sound     the same without it: how often any pulley is told to stand out.
 wrong     as coverage with four unknowns, but the truth has dry friction in its V-joints, which the
           model lacks: how often the readings are told not to be explained.
 
+flight    the unknowns of campaigns/stand, tested on the ground: the 90 % intervals of the
+          asynchrony in flight before and after, from 64 samples each, and whether they hold it.
+
 What each test gave is kept in the file (runs/calibration-KIND.json) as it comes; tests that are
 there are not run again.
 """
@@ -27,6 +30,7 @@ import contextlib
 import io
 import json
 import tempfile
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +43,7 @@ from ringsim.analysis.posterior import FALSE_ALARM, UNEXPLAINED
 from ringsim.campaign.calibration import MEMBERS
 from ringsim.sampling.distributions import Lognormal, Normal, Uniform
 
+STAND = Path(__file__).parents[1] / "campaigns" / "stand"
 RING = {
     "structure.sections": 6, "boom": "none", "solver.end_time": 12.0, "record.interval": 0.1,
 }  # fmt: skip
@@ -63,7 +68,7 @@ PULLEYS = {
 }  # fmt: skip
 BAD = 5.0
 """The bad pulley's friction over the mean."""
-RUNS = {"coverage": 256, "wrong": 256, "bad": 320, "sound": 320}
+RUNS = {"coverage": 256, "wrong": 256, "bad": 320, "sound": 320, "flight": 128}
 KINDS = {"lognormal": Lognormal, "normal": Normal, "uniform": Uniform}
 PLANES, TIMES = ("upper", "lower"), np.arange(0.5, 11.6, 0.5)
 
@@ -101,6 +106,8 @@ def readings_of(scene: ringsim.Scene, stream: np.random.Generator, folder: Path)
 
 def one(kind: str, number: int, runs: int) -> dict[str, Any]:
     """What one test gives."""
+    if kind == "flight":
+        return flight(number, runs)
     stream = np.random.default_rng([number, 1])
     base = ringsim.load_scene("ring18-cable").with_values(RING)
     pulleys = kind in ("bad", "sound")
@@ -150,6 +157,38 @@ def one(kind: str, number: int, runs: int) -> dict[str, Any]:
     return found | {"unknowns": list(values), "ranks": ranks}
 
 
+def flight(number: int, runs: int) -> dict[str, Any]:
+    """What a test on the ground tells of the asynchrony in flight."""
+    stream = np.random.default_rng([number, 2])
+    stand = tomllib.loads((STAND / "friction.toml").read_text(encoding="utf-8"))
+    aloft = tomllib.loads((STAND / "flight_before.toml").read_text(encoding="utf-8"))
+    priors = stand["inputs"]
+    values = {name: float(law(t).quantile(stream.random(1))[0]) for name, t in priors.items()}
+    ground = ringsim.load_scene(stand["scene"]).with_values(stand["set"])
+    scene = ringsim.load_scene(aloft["scene"]).with_values(aloft["set"])
+    shared = {name: value for name, value in values.items() if name in aloft["inputs"]}
+    truth = float(ringsim.simulate(scene.with_values(shared), fidelity="frame")["asynchrony_max"])
+    found: dict[str, Any] = {"number": number, "truth": truth}
+    with tempfile.TemporaryDirectory() as place, contextlib.redirect_stderr(io.StringIO()):
+        folder = Path(place)
+        readings_of(ground.with_values(values | {"record.interval": 0.02}), stream, folder)
+        ringsim.Calibration(
+            ground, priors, folder / "stand.toml", runs=runs, seed=number, fidelity="frame"
+        ).run(workers=0, out=folder / "cal")
+        alone = [name for name in priors if name not in shared]
+        inputs = {
+            "before": aloft["inputs"],
+            "after": {"from": {"file": str(folder / "cal" / "posterior.nc"), "without": alone}},
+        }
+        for when, given in inputs.items():
+            runs_ = ringsim.Campaign(
+                scene, given, {"kind": "random", "samples": 64}, number, fidelity="frame"
+            ).run(workers=0, out=folder / when)
+            ends = np.quantile(runs_["asynchrony_max"].dropna("sample"), [0.05, 0.95])
+            found[when] = ends.tolist()
+    return found
+
+
 def _standing(posterior: xr.Dataset, place: list[Any] | None) -> dict[str, Any]:
     chance = posterior["contrast_chance"].values
     found: dict[str, Any] = {"alarms": int((chance < FALSE_ALARM).sum()),
@@ -173,6 +212,14 @@ def told(kind: str, tests: list[dict[str, Any]]) -> str:
             f"{sum(t['first'] for t in tests)} of them first; others with them in "
             f"{sum(t['alarms'] > t['stands_out'] for t in tests)}"
         )
+    if kind == "flight":
+        cut = [np.ptp(t["after"]) / np.ptp(t["before"]) for t in tests]
+        held = {w: sum(t[w][0] <= t["truth"] <= t[w][1] for t in tests) for w in ("before", "after")}
+        return (
+            f"intervals after the test are {np.median(cut):.3f} times those before (at most "
+            f"{max(cut):.3f}); they hold the truth in {held['after']} of {count}, those before in "
+            f"{held['before']}"
+        )
     if kind == "wrong":
         return f"{sum(t['unexplained'] for t in tests)} of {count} wrong models are told"
     ranks = (np.concatenate([t["ranks"] for t in tests]) + 0.5) / (MEMBERS + 1)
@@ -191,7 +238,7 @@ def told(kind: str, tests: list[dict[str, Any]]) -> str:
 def main() -> None:
     """Run what is missing, and print."""
     asked = argparse.ArgumentParser()
-    asked.add_argument("--kind", choices=("coverage", "bad", "sound", "wrong"), default="coverage")
+    asked.add_argument("--kind", choices=(*RUNS,), default="coverage")
     asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--tests", type=int, default=20)
     asked.add_argument("--runs", type=int)

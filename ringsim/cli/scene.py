@@ -114,7 +114,7 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
     """
     loaded = load_scene(scene).with_values(settings)
     if time is not None:
-        from ringsim.campaign.calibration import opening_angle_for
+        from ringsim.stowed_angle import opening_angle_for
 
         angle = opening_angle_for(loaded, time)
         click.echo(f"structure.opening_angle = {angle:.6g} deg: the ring deploys in {time:g} s")

@@ -217,7 +217,7 @@ def _course(
     )
     if ended.refused is not None:
         if ended.first:
-            click.echo(str(ended.refused), err=True)
+            raise ended.refused
         return EXIT_BAD_INPUT
     if ended.first and ended.code == EXIT_DONE:
         for table in tables(xr.load_dataset(path)):

@@ -24,25 +24,23 @@ from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 
 SETTINGS = {
-    "structure.opening_angle": 120.0, "cables.upper.winch.winding.speed": 0.1,
-    "cables.lower.winch.winding.speed": 0.1, "solver.end_time": 5.0,
-    "cables.upper.friction": {"kind": "bearing", "coefficient": 4e-4},
-    "cables.lower.friction": {"kind": "bearing", "coefficient": 4e-4},
+    "structure.sections": 3, "structure.opening_angle": 100.0, "boom": "none",
+    "solver.end_time": 1.5,
 }  # fmt: skip
 PRIORS = {
     "cables.upper.winch.winding.speed":
-        {"kind": "normal", "mean": 0.1, "standard_deviation": 0.01},
-    "structure.opening_angle": {"kind": "uniform", "low": 115.0, "high": 125.0},
-    "rods.young_modulus": {"kind": "lognormal", "mean": 120e9, "standard_deviation": 12e9},
+        {"kind": "normal", "mean": 0.12, "standard_deviation": 0.01},
+    "structure.opening_angle": {"kind": "uniform", "low": 97.0, "high": 103.0},
+    "rods.poisson_ratio": {"kind": "lognormal", "mean": 0.3, "standard_deviation": 0.02},
 }  # fmt: skip
-TRUTH = {"cables.upper.winch.winding.speed": 0.108, "structure.opening_angle": 118.0}
-TIMES = np.arange(0.2, 3.0, 0.1)
+TRUTH = {"cables.upper.winch.winding.speed": 0.127, "structure.opening_angle": 99.0}
+TIMES = np.arange(0.1, 1.42, 0.05)
 CLOCK = {"offset": 0.3, "drift": -0.02}
 """Of the stand: what the file does not say."""
 
 
 def scene():
-    return load_scene("truss2").with_values(SETTINGS)
+    return load_scene("ring18-cable").with_values(SETTINGS)
 
 
 def write_test(folder, values, *, clock=None, deviation=0.1, seed=1, planned=False):
@@ -54,7 +52,7 @@ def write_test(folder, values, *, clock=None, deviation=0.1, seed=1, planned=Fal
     columns = [(TIMES - clock["offset"]) / (1.0 + clock["drift"])]
     lines = ['name = "stand"']
     if planned:
-        lines += ["clock = { interval = 0.1, end = 2.9 }"]
+        lines += ["clock = { interval = 0.05, end = 1.4 }"]
     else:
         lines += ['file = "stand.csv"', 'clock = { column = "t" }']
     for plane, section in places:
@@ -71,14 +69,12 @@ def write_test(folder, values, *, clock=None, deviation=0.1, seed=1, planned=Fal
     return folder / "stand.toml"
 
 
-def write_file(folder, runs=64, stages=4, more="", inputs=PRIORS):
+def write_file(folder, runs=48, stages=3, more="", inputs=PRIORS):
     """A calibration file beside ``stand.toml``."""
     rows = [f'"{path}" = {table(law)}' for path, law in inputs.items()]
-    scene().save(folder / "truss.toml") if hasattr(scene(), "save") else (
-        folder / "truss.toml"
-    ).write_text(scene().to_toml())
+    (folder / "ring.toml").write_text(scene().to_toml())
     (folder / "cal.toml").write_text("\n".join([
-        'name = "cal"', 'scene = "truss.toml"', "seed = 5", 'measured = "stand.toml"',
+        'name = "cal"', 'scene = "ring.toml"', "seed = 5", 'measured = "stand.toml"',
         f"runs = {runs}", f"stages = {stages}", more, "[inputs]", *rows,
     ]))  # fmt: skip
     return folder / "cal.toml"
@@ -111,7 +107,7 @@ def test_truth_lies_within_what_was_found(found):
         wide = high - low
         assert low - 0.3 * wide < value < high + 0.3 * wide  # 3 sigma
         assert posterior["learnt"].sel(unknown=name) < 0.3
-    assert float(posterior["learnt"].sel(unknown="rods.young_modulus")) > 0.95  # no angle tells it
+    assert float(posterior["learnt"].sel(unknown="rods.poisson_ratio")) > 0.95  # no angle tells it
     assert float(posterior["chance_of_all"]) > 1e-3
     assert int(posterior["lost"].sum()) == 0
 
@@ -137,11 +133,12 @@ def test_samples_quantiles_and_numbers_of_the_file_agree(found):
 
 def test_stages_are_campaigns_of_their_own(found):
     _, folder = found
-    for stage in (1, 4):
+    for stage in (1, 3):
         runs = ringsim.open_campaign(folder / f"stage-{stage}")
         assert runs.sizes["sample"] == 16
     done = CliRunner().invoke(cli, ["status", str(folder / "stage-2")])
-    assert done.exit_code == 0 and "16 of 16" in done.output
+    assert done.exit_code == 0
+    assert "16 of 16" in done.output
 
 
 def test_what_is_printed_is_what_the_file_holds(test_files, found):
@@ -150,11 +147,13 @@ def test_what_is_printed_is_what_the_file_holds(test_files, found):
     assert done.exit_code == 0, done.output
     row = next(r for r in done.output.splitlines() if r.startswith("structure.opening_angle"))
     cells = [cell.strip() for cell in row.split("  ") if cell.strip()]
-    low, middle, high = posterior["posterior_quantile"].sel(unknown="structure.opening_angle").values
+    low, middle, high = (
+        posterior["posterior_quantile"].sel(unknown="structure.opening_angle").values
+    )
     assert cells[1] == "deg"
     assert float(cells[3]) == pytest.approx(middle, rel=1e-3)
     assert [float(v) for v in cells[4].split(" .. ")] == pytest.approx([low, high], rel=2e-3)
-    assert "hardly learnt from these sensors: rods.young_modulus" in done.output
+    assert "hardly learnt from these sensors: rods.poisson_ratio" in done.output
     assert "the posterior explains every sensor" in done.output
     assert f"wrote {folder / POSTERIOR}" in done.output
 
@@ -179,7 +178,8 @@ def test_killed_in_a_stage_and_finished_by_other_workers_it_is_the_same(
     )  # fmt: skip
     end = time.monotonic() + 120.0
     while not (out / "stage-2" / "design.nc").exists():  # killed while the second one runs
-        assert process.poll() is None and time.monotonic() < end
+        assert process.poll() is None
+        assert time.monotonic() < end
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
@@ -189,7 +189,9 @@ def test_killed_in_a_stage_and_finished_by_other_workers_it_is_the_same(
     assert equal(out / POSTERIOR, found[1] / POSTERIOR)
 
 
-MPIEXEC = shutil.which("mpiexec", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+MPIEXEC = shutil.which(
+    "mpiexec", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+)
 
 
 @pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: ringsim[mpich]")
@@ -211,8 +213,8 @@ def test_clock_of_the_stand_is_found_too(tmp_path):
         'offset = { kind = "normal", mean = 0.0, standard_deviation = 0.3 }\n'
         'drift = { kind = "normal", mean = 0.0, standard_deviation = 0.02 }\n'
     )
-    inputs = {k: v for k, v in PRIORS.items() if k != "rods.young_modulus"}
-    file = write_file(tmp_path, 96, 4, more, inputs)
+    inputs = {k: v for k, v in PRIORS.items() if k != "rods.poisson_ratio"}
+    file = write_file(tmp_path, 48, 3, more, inputs)
     posterior = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / "out")
     for name, value in (TRUTH | {f"clock.{k}": v for k, v in CLOCK.items()}).items():
         low, _, high = posterior["posterior_quantile"].sel(unknown=name).values
@@ -221,9 +223,9 @@ def test_clock_of_the_stand_is_found_too(tmp_path):
     assert posterior.attrs["inputs"].count("clock") == 0  # no campaign draws them
 
 
-def test_friction_that_the_model_lacks_is_told(tmp_path):
-    write_test(tmp_path, TRUTH | {"joints.vjoint.coulomb": 0.3}, deviation=0.05)
-    file = write_file(tmp_path, inputs={k: v for k, v in PRIORS.items() if "young" not in k})
+def test_friction_that_the_model_does_not_know_is_told(tmp_path):
+    write_test(tmp_path, TRUTH | {"cables.upper.friction.coefficient": 2e-3})
+    file = write_file(tmp_path, inputs={k: v for k, v in PRIORS.items() if "poisson" not in k})
     done = CliRunner().invoke(
         cli, ["calibrate", str(file), "--out", str(tmp_path / "out"), "--workers", "1"]
     )
@@ -237,11 +239,11 @@ def test_friction_that_the_model_lacks_is_told(tmp_path):
 def test_campaign_draws_what_was_found(found, tmp_path):
     posterior, folder = found
     shutil.copy(folder / POSTERIOR, tmp_path)
-    (tmp_path / "truss.toml").write_text(scene().to_toml())
+    (tmp_path / "ring.toml").write_text(scene().to_toml())
     (tmp_path / "flight.toml").write_text(
-        'name = "flight"\nscene = "truss.toml"\nfidelity = "frame"\n'
+        'name = "flight"\nscene = "ring.toml"\nfidelity = "frame"\n'
         'design = { kind = "sobol", samples = 256 }\n'
-        '[inputs]\nfrom = { file = "posterior.nc", without = ["rods.young_modulus"] }\n'
+        '[inputs]\nfrom = { file = "posterior.nc", without = ["rods.poisson_ratio"] }\n'
         '"rods.damping" = { kind = "uniform", low = 0.0005, high = 0.002 }\n'
     )
     table_ = ringsim.campaign.specification.load_campaign(tmp_path / "flight.toml").draw()
@@ -289,16 +291,25 @@ def test_plan_of_sensors_foretells_what_a_test_tells(test_files, found, tmp_path
         )
     assert (plan["learnt"].diff("sensor") < 1e-6).all()
     refused = CliRunner().invoke(cli, ["calibrate", str(file), "--out", str(tmp_path / "cal")])
-    assert refused.exit_code == 2 and "still to come" in refused.output
+    assert refused.exit_code == 2
+    assert "still to come" in refused.output
 
 
 @for_each(
     "more, inputs, words",
     [
-        ('design = { kind = "random", samples = 4 }', PRIORS, "design: a calibration places its own"),
+        (
+            'design = { kind = "random", samples = 4 }',
+            PRIORS,
+            "design: a calibration places its own",
+        ),
         ("check_every = 4", PRIORS, "check_every: leave it out"),
         ("", {}, "there is nothing to find"),
-        ("", {"loads.force": {"kind": "discrete", "values": [0.1, 0.2]}}, "continuous distribution"),
+        (
+            "",
+            {"loads.force": {"kind": "discrete", "values": [0.1, 0.2]}},
+            "continuous distribution",
+        ),
         ("clock = { offset = 3 }", PRIORS, "clock.offset"),
         ("mesured = 1", PRIORS, "mesured"),
     ],
@@ -316,7 +327,8 @@ def test_too_few_runs_and_readings_out_of_time_are_refused(tmp_path):
     write_test(tmp_path, {})
     file = write_file(tmp_path, runs=16, stages=4)
     done = CliRunner().invoke(cli, ["calibrate", str(file), "--out", str(tmp_path / "out")])
-    assert done.exit_code == 2 and "set runs = 32 at least" in done.output
+    assert done.exit_code == 2
+    assert "set runs = 32 at least" in done.output
     stand = tmp_path / "stand.toml"
     stand.write_text(stand.read_text().replace('"t" }', '"t", offset = 99.0 }'))
     file = write_file(tmp_path, runs=32, inputs={k: PRIORS[k] for k in list(PRIORS)[:1]},
@@ -333,8 +345,11 @@ def test_too_few_runs_and_readings_out_of_time_are_refused(tmp_path):
         ('from = "none.nc"', "none.nc cannot be read"),
         ('from = { file = "posterior.nc", without = ["x"] }', "x is no unknown of posterior.nc"),
         ('from = { fil = "posterior.nc" }', "fil"),
-        ('from = "posterior.nc"\n"structure.opening_angle" = { kind = "uniform", low = 1.0, '
-         'high = 2.0 }', "is given by inputs and by inputs.from"),
+        (
+            'from = "posterior.nc"\n"structure.opening_angle" = { kind = "uniform", low = 1.0, '
+            "high = 2.0 }",
+            "is given by inputs and by inputs.from",
+        ),
         ('from = "runs.nc"', "has no posterior"),
     ],
 )
@@ -346,7 +361,8 @@ def test_what_of_a_posterior_is_refused(said, words, found, tmp_path):
         'name = "c"\nscene = "truss2"\ndesign = { kind = "random", samples = 2 }\n[inputs]\n' + said
     )
     done = CliRunner().invoke(cli, ["campaign", str(tmp_path / "c.toml"), "--dry-run"])
-    assert done.exit_code == 2 and words in done.output, done.output
+    assert done.exit_code == 2, done.output
+    assert words in done.output, done.output
 
 
 def test_unknown_that_another_scene_lacks_is_named_with_its_cure(found, tmp_path):
@@ -357,7 +373,8 @@ def test_unknown_that_another_scene_lacks_is_named_with_its_cure(found, tmp_path
         '[inputs]\nfrom = "posterior.nc"'
     )
     done = CliRunner().invoke(cli, ["campaign", str(tmp_path / "c.toml"), "--dry-run"])
-    assert done.exit_code == 2 and "leave it out by without = [" in done.output, done.output
+    assert done.exit_code == 2, done.output
+    assert "leave it out by without = [" in done.output, done.output
 
 
 @for_each(

@@ -170,7 +170,7 @@ WRONG_FILES = {
     "no place": (ENCODER.replace('place = { plane = "upper", section = 2 }', ""),
                  "place = { plane = ..., section = ... }"),
     "a value over time": (ENCODER.replace('column = "enc"', "value = 3.0"), "give column"),
-    "neither": (ENCODER.replace('column = "enc"', ""), "neither given"),
+    "neither": (ENCODER.replace('column = "enc"', ""), "has neither column nor value"),
     "no scatter": (ENCODER.replace("standard_deviation = 0.002", "standard_deviation = 0.0"),
                    "standard_deviation = 0.0 must be above 0"),
     "twice": (ENCODER + ENCODER, "two of them measure opening_angle upper 2"),

@@ -39,11 +39,11 @@ def staged(model, told_by, unknowns, members, stages=4, seed=2):
     """The result of stages on a model (points to outputs)."""
     stream = np.random.default_rng(seed)
     points = stream.standard_normal((members, unknowns))
-    for stage in range(stages):
-        if stage:
-            points = found.posterior.draw(members, stream, WIDER)
+    found = learn(points, told_by(model(points)))
+    for _ in range(stages - 1):
+        points = found.posterior.draw(members, stream, WIDER)
         found = learn(points, told_by(model(points)))
-    return found, points
+    return found
 
 
 def sensors(outputs, data, count=4, deviation=1.0, bias=0.0):
@@ -57,7 +57,7 @@ def sensors(outputs, data, count=4, deviation=1.0, bias=0.0):
 def test_linear_model_gives_the_closed_form():
     slope, stream = slopes(), np.random.default_rng(3)
     data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(READINGS)
-    found, _ = staged(lambda u: u @ slope.T, lambda y: sensors(y, data), UNKNOWNS, 4096)
+    found = staged(lambda u: u @ slope.T, lambda y: sensors(y, data), UNKNOWNS, 4096)
     mean, covariance = closed_form(slope, data, np.eye(READINGS))
     scatter = np.sqrt(np.diag(covariance))
     assert np.abs(found.posterior.mean - mean).max() < 0.02 * scatter.min()
@@ -104,7 +104,7 @@ def made(strays=(), shift=0.0, seed=6):
 
 
 def run(slope, data, count=4):
-    return staged(lambda u: u @ slope.T, lambda y: sensors(y, data, count), UNKNOWNS, 200)[0]
+    return staged(lambda u: u @ slope.T, lambda y: sensors(y, data, count), UNKNOWNS, 200)
 
 
 def test_strays_are_set_aside_and_what_is_left_is_what_is_without_them():
@@ -143,8 +143,8 @@ def test_misfit_below_the_scatter_shows_by_its_pattern():
     stream = np.random.default_rng(8)
     data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(400)
     wave = 0.6 * np.sin(np.linspace(0.0, 40.0, 400))
-    wrong = staged(lambda u: u @ slope.T, lambda y: sensors(y, data + wave), UNKNOWNS, 200)[0]
-    sound = staged(lambda u: u @ slope.T, lambda y: sensors(y, data), UNKNOWNS, 200)[0]
+    wrong = staged(lambda u: u @ slope.T, lambda y: sensors(y, data + wave), UNKNOWNS, 200)
+    sound = staged(lambda u: u @ slope.T, lambda y: sensors(y, data), UNKNOWNS, 200)
     assert wrong.chance < UNEXPLAINED < sound.chance
     assert wrong.pattern > 3.0 > abs(sound.pattern)
     assert min(fit.chance for fit in wrong.fits) > UNEXPLAINED
@@ -181,7 +181,7 @@ def test_bad_place_stands_out_also_if_all_places_have_moved():
 
 def test_sensors_come_in_the_order_of_what_they_leave():
     """Against every pair and every single one by the closed form."""
-    slope, count = slopes(9, unknowns=3, readings=60), 6
+    slope, count = 4.0 * slopes(9, unknowns=3, readings=60), 6
     points = np.random.default_rng(10).standard_normal((400, 3))
     found = rank(points, sensors(points @ slope.T, np.zeros(60), count))
 

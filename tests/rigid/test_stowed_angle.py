@@ -6,12 +6,12 @@ import pytest
 from click.testing import CliRunner
 from loops import for_each
 
-from ringsim.campaign.calibration import opening_angle_for
 from ringsim.cli import cli
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene
 from ringsim.simulation import run
+from ringsim.stowed_angle import opening_angle_for
 from small_rings import pulled, six
 
 WANTED = 7.0
