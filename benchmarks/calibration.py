@@ -214,7 +214,9 @@ def told(kind: str, tests: list[dict[str, Any]]) -> str:
         )
     if kind == "flight":
         cut = [np.ptp(t["after"]) / np.ptp(t["before"]) for t in tests]
-        held = {w: sum(t[w][0] <= t["truth"] <= t[w][1] for t in tests) for w in ("before", "after")}
+        held = {
+            w: sum(t[w][0] <= t["truth"] <= t[w][1] for t in tests) for w in ("before", "after")
+        }
         return (
             f"intervals after the test are {np.median(cut):.3f} times those before (at most "
             f"{max(cut):.3f}); they hold the truth in {held['after']} of {count}, those before in "

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from click.testing import CliRunner
 from loops import for_each
 
 import ringsim
-from ringsim.campaign.calibration import POSTERIOR, SENSORS
+from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
 from ringsim.cli import cli
 from ringsim.sampling.distributions import Calibrated, Lognormal, Truncated, Uniform
 from ringsim.scene import load_scene
@@ -396,3 +397,27 @@ def test_calibrated_distribution_is_one(of):
     np.testing.assert_allclose(np.exp(law.log_density(values)), slope, rtol=1e-6)
     plain = Calibrated(of=of, shift=0.0, remaining_scatter=1.0)
     np.testing.assert_allclose(plain.quantile(shares), of.quantile(shares), rtol=1e-12)
+
+
+STAND = Path(__file__).parents[2] / "campaigns" / "stand"
+
+
+@pytest.mark.slow
+def test_shipped_test_is_explained_and_holds_its_truth(tmp_path):
+    """That of docs/guide/calibrate.md, made by the other engine."""
+    posterior = ringsim.Calibration.read(STAND / "friction.toml").run(2, out=tmp_path / "out")
+    truth = tomllib.loads((STAND / "truth.toml").read_text(encoding="utf-8"))
+    known = truth["values"] | {"clock.offset": truth["clock"]["offset"]}
+    assert set(known) == set(posterior["unknown"].values)
+    for name, value in known.items():
+        low, _, high = posterior["posterior_quantile"].sel(unknown=name).values
+        assert low < value < high, name
+    assert float(posterior["chance_of_all"]) > 1e-3
+    assert float(posterior["learnt"].sel(unknown="joints.vjoint.viscous")) < 0.1
+
+
+def test_shipped_test_can_be_read():
+    given = calibration_of((STAND / "friction.toml").read_text(encoding="utf-8"),
+                           STAND / "friction.toml")  # fmt: skip
+    assert len(given.measurement.readings) == 14
+    assert given.members == 48
