@@ -396,6 +396,8 @@ def _write_posterior(course: _Course) -> None:
                            "quantiles of the prior"),
         "posterior_quantile": (("unknown", "level"), np.array([x.quantile(levels) for x in laws]),
                                "quantiles of the posterior"),
+        "shift": (per_unknown, mean, "mean of the posterior in standard normal space: sigmas of "
+                  "the prior from its median"),
         "learnt": (per_unknown, deviation, "standard deviation of the posterior over that of the "
                    "prior, both in standard normal space"),
         "correlation": (("unknown", "other"), correlation,

@@ -9,7 +9,7 @@ import click
 import tomli_w
 
 from ringsim.campaign.panels import Panel, by_engines, panels_over
-from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
+from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS, draw_learnt
 from ringsim.execution.mpi import launched_size
 from ringsim.files import read_text, write_text
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED
@@ -168,8 +168,9 @@ def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float
 @SETTINGS
 @click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME).")
 @_WORKERS
+@click.option("--plot", is_flag=True, help="Draw what was learnt beside posterior.nc.")
 def calibrate_command(
-    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None, *, plot: bool
 ) -> int:
     """Find unknown inputs from measured data: FILE has priors, the data and a budget of runs.
 
@@ -180,7 +181,7 @@ def calibrate_command(
     """
     from ringsim.analysis.posterior import calibration_tables
 
-    return _course(file, settings, out, workers, calibration_tables, planning=False)
+    return _course(file, settings, out, workers, calibration_tables, planning=False, plot=plot)
 
 
 @click.command()
@@ -204,7 +205,7 @@ def sensors_command(
 
 def _course(
     file: Path, settings: dict[str, Any], out: Path | None, workers: int | None,
-    tables: Callable[[Any], list[Table]], *, planning: bool,
+    tables: Callable[[Any], list[Table]], *, planning: bool, plot: bool = False,
 ) -> int:  # fmt: skip
     import xarray as xr
 
@@ -220,8 +221,11 @@ def _course(
             raise ended.refused
         return EXIT_BAD_INPUT
     if ended.first and ended.code == EXIT_DONE:
-        for table in tables(xr.load_dataset(path)):
+        found = xr.load_dataset(path)
+        for table in tables(found):
             for line in ["", *table.lines()]:
                 click.echo(line)
         click.echo(f"wrote {path}")
+        if plot:
+            draw_learnt(found, path.parent, path.stem)
     return ended.code

@@ -13,6 +13,7 @@ from ringsim.analysis.comparison_text import differing, names_of
 from ringsim.analysis.courses import deployed, names_of_ends
 from ringsim.analysis.design import blocks, endings, population_of, scalars, values_of
 from ringsim.analysis.intervals import good, numbers, tells_of, used
+from ringsim.analysis.posterior import UNEXPLAINED
 from ringsim.analysis.residuals import Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
@@ -20,6 +21,7 @@ from ringsim.plots.campaign.frame import base_of, legend, limits, of_cases
 from ringsim.tables import (
     estimate_text,
     interval_text,
+    number_text,
     readable,
     unit_behind,
     unit_text,
@@ -295,4 +297,48 @@ def measured_and_computed(found: list[Residuals], title: str) -> Figure:
     more = f" ({left_out} sensors that fit better are not drawn)" * bool(left_out)
     style.title(figure, f"Measured and computed: {title}{more}")
     style.in_readable_units(figure)
+    return figure
+
+
+_BAND = 1.6449
+"""Half of what holds 90 % of a normal variable, in sigmas."""
+
+
+@style.styled
+def learnt(posterior: xr.Dataset) -> Figure:
+    """What a calibration has found: on the left each unknown before the data (grey, 90 %) and after
+    them, in sigmas of the prior, with its median; on the right how far each sensor is off.
+    """
+    unknowns, sensors = posterior.sizes["unknown"], posterior.sizes["sensor"]
+    figure = Figure(figsize=(12.0, max(0.42 * unknowns, 0.24 * sensors, 2.0) + 1.6))
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+    names = []
+    for k in range(unknowns):
+        one = posterior.isel(unknown=k)
+        quantiles = one["posterior_quantile"].values
+        factor, units = readable(str(one["unknown_units"].item()), float(np.abs(quantiles).max()))
+        half = _BAND * float(one["learnt"])
+        left.barh(k, 2.0 * _BAND, left=-_BAND, height=0.62, color=style.GREY, alpha=0.3)
+        left.errorbar(float(one["shift"]), k, xerr=half, fmt="o", color=style.BLUE, markersize=5,
+                      capsize=3, linewidth=1.8)  # fmt: skip
+        told = f"{number_text(factor * quantiles[1], 4)} {unit_text(units)}".rstrip()
+        names.append(f"{one['unknown'].item()}\n{told}")
+    left.set_yticks(range(unknowns), names)
+    shifts, halves = posterior["shift"].values, _BAND * posterior["learnt"].values
+    ends = np.concatenate([shifts - halves, shifts + halves, [-_BAND, _BAND]])
+    left.set_xlim(1.05 * ends.min(), 1.05 * ends.max())
+    left.set_xlabel("Sigmas of the prior from its median")
+    left.set_title("Unknowns before (grey) and after the data: 90 %, median", fontsize=10)
+    far = posterior["chance"].values < UNEXPLAINED
+    right.axvline(1.0, color=style.GREY, linewidth=0.9)
+    right.scatter(posterior["rms_in_deviations"], range(sensors), s=22, zorder=3,
+                  color=np.where(far, style.VERMILLION, style.BLUE))  # fmt: skip
+    right.set_yticks(range(sensors), [str(name) for name in posterior["sensor"].values])
+    right.set_xlim(0.0, 1.08 * max(1.2, float(posterior["rms_in_deviations"].max())))
+    right.set_xlabel("rms of misfits (1: scatter alone)")
+    right.set_title("Sensors" + ", in red those not explained" * bool(far.any()), fontsize=10)
+    for axes, count in ((left, unknowns), (right, sensors)):
+        axes.set_ylim(count - 0.4, -0.6)
+        axes.tick_params(axis="y", labelsize=8.5, length=0)
+    style.title(figure, f"Learnt from the test: {posterior.attrs['title']}")
     return figure

@@ -20,6 +20,7 @@ from loops import for_each
 import ringsim
 from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
 from ringsim.cli import cli
+from ringsim.plots.comparison import learnt
 from ringsim.sampling.distributions import Calibrated, Lognormal, Truncated, Uniform
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
@@ -421,3 +422,21 @@ def test_shipped_test_can_be_read():
                            STAND / "friction.toml")  # fmt: skip
     assert len(given.measurement.readings) == 14
     assert given.members == 48
+
+
+def test_figure_shows_what_the_file_holds(found, tmp_path):
+    posterior, folder = found
+    figure = learnt(posterior)
+    left, right = figure.axes
+    shown = [label.get_text().splitlines()[0] for label in left.get_yticklabels()]
+    assert shown == posterior["unknown"].values.tolist()
+    for k, (bar, line) in enumerate(zip(left.containers[::2], left.containers[1::2], strict=True)):
+        assert bar[0].get_x() == pytest.approx(-1.6449)
+        (low, high) = line.lines[2][0].get_segments()[0][:, 0]
+        assert 0.5 * (low + high) == pytest.approx(float(posterior["shift"][k]))
+        assert high - low == pytest.approx(2 * 1.6449 * float(posterior["learnt"][k]))
+    marks = right.collections[0].get_offsets()
+    np.testing.assert_allclose(marks[:, 0], posterior["rms_in_deviations"])
+    done = CliRunner().invoke(cli, ["plot", str(folder / POSTERIOR), "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "posterior-fig-learnt.png").stat().st_size > 10_000
