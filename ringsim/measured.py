@@ -159,7 +159,8 @@ class Measured(Model):
     title: Annotated[str, Field(max_length=300)] = ""
     """One line for figures."""
     file: str = ""
-    """The table of readings, beside this file: CSV with a row of heads."""
+    """The table of readings, beside this file: CSV with a row of heads, or netCDF with a variable a
+    column, along one dimension."""
     clock: Clock | None = None
     """Of the table."""
     sensors: Annotated[tuple[Sensor, ...], ListIn, Field(min_length=1, max_length=1000)]
@@ -287,6 +288,55 @@ def _table(file: Measured, path: Path) -> dict[str, Array]:
     if file.clock.unit not in _UNITS["s"]:
         known = " or ".join(map(show, _UNITS["s"]))
         raise InputError(f"clock.unit = {show(file.clock.unit)} is no unit of time: choose {known}")
+    wanted = dict.fromkeys([file.clock.column, *(s.column for s in file.sensors if s.column)])
+    found = (_from_netcdf if path.suffix == ".nc" else _from_csv)(path, list(wanted))
+    times = found[file.clock.column]
+    if not np.isfinite(times).all():
+        place = int(np.argmin(np.isfinite(times))) + 1
+        raise InputError(f"{path.name}: row {place}: has no time: give it one, or leave it out")
+    if (back := np.flatnonzero(np.diff(times) <= 0.0)).size:
+        place, unit = int(back[0]) + 2, file.clock.unit
+        raise InputError(
+            f"{path.name}: row {place}: its time {times[place - 1]:g} {unit} is not after "
+            f"{times[place - 2]:g} {unit} of the row before: the clock stands or jumps: correct "
+            "the column, or cut the table there"
+        )
+    return found
+
+
+def _from_netcdf(path: Path, wanted: list[str]) -> dict[str, Array]:
+    """The variables of these names, each along the same one dimension; values that are masked, or
+    not numbers, are empty cells.
+    """
+    import netCDF4
+
+    found = dict[str, Array]()
+    try:
+        with netCDF4.Dataset(path) as data:
+            for name in wanted:
+                if name not in data.variables:
+                    hint = known_or_nearest(name, data.variables)
+                    raise InputError(f"{path.name}: variable {show(name)} is not in it ({hint})")
+                variable = data[name]
+                if len(variable.dimensions) != 1 or variable.dtype.kind not in "iuf":
+                    raise InputError(
+                        f"{path.name}: variable {show(name)} must be numbers along one dimension, "
+                        f"and is {variable.dtype} along {', '.join(variable.dimensions) or 'none'}"
+                    )
+                values = np.ma.filled(variable[:].astype(float), np.nan)
+                if found and len(values) != len(next(iter(found.values()))):
+                    raise InputError(
+                        f"{path.name}: variable {show(name)} has {len(values)} values, and "
+                        f"{show(wanted[0])} has {len(found[wanted[0]])}: give both one dimension"
+                    )
+                found[name] = values
+    except OSError as error:
+        raise InputError(f"{path.name}: cannot be read: {error}") from None
+    return found
+
+
+def _from_csv(path: Path, wanted: list[str]) -> dict[str, Array]:
+    """The columns of these heads."""
     text = read_text(path)
     lines = [row for row in text.splitlines() if row.strip() and not row.startswith("#")]
     if len(lines) < 2:
@@ -297,7 +347,6 @@ def _table(file: Measured, path: Path) -> dict[str, Array]:
     except csv.Error as error:
         raise InputError(f"{path.name}: is no table: {error}: write it as plain CSV") from None
     head = [cell.strip() for cell in head]
-    wanted = dict.fromkeys([file.clock.column, *(s.column for s in file.sensors if s.column)])
     for name in wanted:
         if head.count(name) != 1:
             hint = "two columns are called so" if name in head else known_or_nearest(name, head)
@@ -311,17 +360,6 @@ def _table(file: Measured, path: Path) -> dict[str, Array]:
             )
         for name, column in found.items():
             column[number - 1] = _number(row[head.index(name)], f"{path.name}: row {number}", name)
-    times = found[file.clock.column]
-    if not np.isfinite(times).all():
-        place = int(np.argmin(np.isfinite(times))) + 1
-        raise InputError(f"{path.name}: row {place}: has no time: give it one, or leave it out")
-    if (back := np.flatnonzero(np.diff(times) <= 0.0)).size:
-        place, unit = int(back[0]) + 2, file.clock.unit
-        raise InputError(
-            f"{path.name}: row {place}: its time {times[place - 1]:g} {unit} is not after "
-            f"{times[place - 2]:g} {unit} of the row before: the clock stands or jumps: correct "
-            "the column, or cut the table there"
-        )
     return found
 
 
