@@ -186,17 +186,25 @@ def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
 
 
 def in_readable_units(figure: Figure) -> None:
-    """Let the axes and words of a figure of SI values give stress as people read it."""
+    """Let the axes and words of a figure of SI values give stress as people read it.
+
+    An axis of stress is one that its label names so, or the figure's for all axes, or, where the
+    vertical axis has no label, the title of its panel.
+    """
+    told = ""
     for axes, side in product(figure.axes, ("x", "y")):
         axis: Axis = getattr(axes, f"{side}axis")
-        beside = getattr(figure, f"get_sup{side}label")()
-        if _PASCAL in axis.get_label_text() or _PASCAL in beside:
+        words = axis.get_label_text() + getattr(figure, f"get_sup{side}label")()
+        if side == "y" and not words:
+            words = axes.get_title("left") + axes.get_title("center") + axes.get_title("right")
+        if _PASCAL in words:
             factor, units = readable("Pa", max(map(abs, axis.get_view_interval())))
             axis.set_major_formatter(FuncFormatter(partial(_scaled, factor)))
             axis.set_minor_formatter(NullFormatter())
-            axis.set_label_text(axis.get_label_text().replace(_PASCAL, f"({units})"))
-    for text in figure.findobj(Text):
-        text.set_text(text.get_text().replace(_PASCAL, "(MPa)"))
+            told = f"({units})"
+            axis.set_label_text(axis.get_label_text().replace(_PASCAL, told))
+    for text in figure.findobj(Text) if told else ():
+        text.set_text(text.get_text().replace(_PASCAL, told))
 
 
 _PASCAL = "(Pa)"

@@ -434,3 +434,25 @@ def test_the_course_of_the_margin_begins_where_runs_begin() -> None:
     np.testing.assert_allclose(laid[:3, 0], [-0.5, 0.4, 2.0])
     np.testing.assert_allclose(laid[:3, -1], 5.0)
     assert np.isnan(laid[3, [0, -1]]).all()
+
+
+@pytest.mark.parametrize("kind", ["random", "one-at-a-time"])
+def test_stress_has_the_numbers_of_its_unit_in_all_figures(kind: str) -> None:
+    campaign = made_campaign(12)
+    campaign.attrs["design"] = json.dumps({"kind": kind})
+    variable = VARIABLES["peak_rod_stress"]
+    about = {"long_name": variable.long_name, "units": variable.units}
+    campaign["peak_rod_stress"] = "sample", np.linspace(5e6, 8e6, 12), about
+    seen = set()
+    for picture, figure in figures_of(campaign):
+        for axes in figure.axes:
+            titled = axes.get_title(loc="left") if not axes.get_ylabel() else ""
+            for axis, words in ((axes.xaxis, axes.get_xlabel()), (axes.yaxis, titled)):
+                if "stress" in words.lower() and "(" in words:
+                    assert "(MPa)" in words
+                    figure.draw_without_rendering()
+                    places = axis.get_majorticklocs()
+                    told = axis.get_major_formatter().format_ticks(places)
+                    assert [float(text) for text in told] == pytest.approx(1e-6 * places)
+                    seen.add(picture.name)
+    assert seen == ({"one_by_one"} if kind == "one-at-a-time" else {"distributions", "convergence"})

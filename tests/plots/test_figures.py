@@ -263,6 +263,25 @@ def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
         assert float(tick.get_text()) == pytest.approx(1e-6 * place)
 
 
+def test_a_vertical_axis_without_a_name_has_the_unit_of_its_panel_s_title():
+    figure = Figure()
+    stress, force, share = figure.subplots(1, 3)
+    for axes, title in ((stress, "Largest stress (Pa)"), (force, "Force (N)"), (share, "Share")):
+        axes.plot([0.0, 1.0], [4e6, 9e6])
+        axes.set_title(title, loc="left")
+    style.in_readable_units(figure)
+    figure.draw_without_rendering()
+    assert stress.get_title(loc="left") == "Largest stress (MPa)"
+    for axes, factor in ((stress, 1e-6), (force, 1.0), (share, 1.0)):
+        scale = float(axes.yaxis.get_offset_text().get_text() or 1.0)
+        told = [scale * float(tick.get_text()) for tick in axes.get_yticklabels()]
+        assert told == pytest.approx(factor * axes.get_yticks())
+    bare = Figure()
+    bare.suptitle("Stress (Pa)")
+    style.in_readable_units(bare)
+    assert bare.get_suptitle() == "Stress (Pa)"
+
+
 @for_each("sections", [[], [0], [1, 19], range(1, 8)])
 def test_sections_that_do_not_exist_are_refused(sections, deployed):
     with pytest.raises(ValueError, match=r"sections = .* 1\.\.18"):

@@ -213,7 +213,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
         _draw(axes, bars)
         known = np.isfinite(bars.ends).all(axis=1)
         certain, uncertain = certain or bool(known.any()), uncertain or not known.all()
-        words = style.label(campaign[output], width=42) if output in campaign else output
+        # Without its unit, which is not that of the bars.
+        words = style.label(campaign[output], "1", 42) if output in campaign else output
         axes.set_title(words, fontsize=9.5, color=style.INK)
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
         unit = f" ({units})" if bars.measure == "mean_absolute_effect" and units != "1" else ""
