@@ -8,10 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from ringsim.analysis.design import inputs, paths_of
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
+from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.registry import picture
 from ringsim.scene import scene_from_toml
@@ -67,9 +69,7 @@ def drive(dataset: xr.Dataset) -> Figure:
         told = [f"least margin {least:.3f} at {where:.0f} deg"]
     if (known["time"] >= stopped).any():
         told.append(f"no margin from {stopped:.4g} s on: the {winch} has stopped")
-    style.free(lower.text(
-        0.98, 0.95, "\n".join(told), ha="right", va="top", transform=lower.transAxes,
-    ))  # fmt: skip
+    lower.set_title("; ".join(told), fontsize=9.5)  # inside it would lie on the curve
     style.margin_axis(lower, margin, f"Margin by {standard_of(dataset)}")
     lower.set_xlabel("Mean opening angle (deg)")
     style.head(figure, upper, dataset, "Drive and resistance")
@@ -83,18 +83,39 @@ def standard_of(dataset: xr.Dataset) -> str:
 
 
 def first_stop(dataset: xr.Dataset) -> tuple[float, str]:
-    """When the first of a scene's winches is switched off (s), and its name; infinity if none is.
+    """When the first of a run's winches is switched off (s), and its name; infinity if none is."""
+    ends = {name: float(time) for name, time in stop_times(dataset).items()}
+    return min(((time, name) for name, time in ends.items()), default=(np.inf, ""))
 
-    Of winches that turn at all, and not of those that stop because their plane has locked.
+
+def stop_times(dataset: xr.Dataset) -> dict[str, Array]:
+    """When each winch is switched off, s, by its name: () of a run, (sample,) of a campaign;
+    infinity if it is not.
+
+    From then on it holds its rope, which lets its plane open no further: the drive has no margin
+    any more.  Of winches that turn at all, and not of those that stop because their plane has
+    locked.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    stops = [
-        (winch.stop_time, f"{end} of the {scene.structure.planes[plane]} cable")
-        for plane, cable in ([] if scene.cables is None else scene.cables.present())
-        for end, winch in zip(("winch", "far winch"), cable.winches, strict=False)
-        if winch.stop_time is not None and winch.stop_time != winch.start_time
-    ]
-    return min(stops, default=(np.inf, ""))
+    drawn = {path: dataset[name].to_numpy() for name in inputs(dataset)
+             for path in paths_of(dataset[name]) if path.endswith("_time")}  # fmt: skip
+    found = {}
+    for plane, cable in [] if scene.cables is None else scene.cables.present():
+        called = scene.structure.planes[plane]
+        for end, winch in zip(("winch", "far winch"), cable.winches, strict=False):
+            own = "winch" if cable.far_winch is None else end.replace(" ", "_")
+            path = f"cables.{called}.{own}"
+            begin, stop = (
+                _seconds(drawn.get(f"{path}.{name}", np.array(str(getattr(winch, name)).lower())))
+                for name in ("start_time", "stop_time")
+            )
+            found[f"{end} of the {called} cable"] = np.where(stop == begin, np.inf, stop)
+    return found
+
+
+def _seconds(values: Array) -> Array:
+    """Times that may be "none"."""
+    return np.where(values.astype(str) == "none", "inf", values.astype(str)).astype(float)
 
 
 _MOTOR = ("motor_current", "motor_torque", "motor_speed", "motor_power")

@@ -12,7 +12,7 @@ from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_motor
 from ringsim.analysis.courses import courses, ends
 from ringsim.plots.campaign.endings import latch_rate, lock_impulse, margin
 from ringsim.plots.campaign.endings import motors as motors_of_samples
-from ringsim.plots.drives_and_locks import drive, least_rate, locks, motors
+from ringsim.plots.drives_and_locks import drive, least_rate, locks, motors, stop_times
 from ringsim.plots.figures import figures_of
 from ringsim.plots.style import locked_time
 from ringsim.scene import Scene, load_scene
@@ -190,10 +190,10 @@ def with_margin(least: float, moment: float, stop: float) -> xr.Dataset:
     ("moment", "stop", "told"),
     [
         (5.0, math.inf, "least margin -0.005 at 100 deg"),
-        (2.0, 6.0, "least margin -0.005 at 52 deg\n"
+        (2.0, 6.0, "least margin -0.005 at 52 deg; "
          "no margin from 6 s on: the winch of the lower cable has stopped"),
         # The least one of all comes after the stop: of those before, it is the last.
-        (8.0, 4.0, "least margin 0.560 at 76 deg\n"
+        (8.0, 4.0, "least margin 0.560 at 76 deg; "
          "no margin from 4 s on: the winch of the lower cable has stopped"),
     ],
 )  # fmt: skip
@@ -202,10 +202,35 @@ def test_the_margin_of_a_run_ends_where_a_winch_stops(
 ) -> None:
     run = with_margin(-0.005, moment, stop)
     axes = drive(run).axes[1]
-    assert told in [text.get_text() for text in axes.texts]
+    assert told == axes.get_title(loc="left")  # above the frame, where no curve runs
     assert axes.get_ylabel().startswith("Margin by NASA-STD-5017B")
     last = TIMES[stop > TIMES][-1]
     curve, _, least = axes.lines
     known = np.isfinite(curve.get_ydata())
     assert curve.get_xdata()[known][-1] == pytest.approx(20.0 + 16.0 * last)
     assert least.get_ydata()[0] == pytest.approx(curve.get_ydata()[known].min())
+
+
+def test_margins_of_a_campaign_end_where_the_winch_of_a_sample_stops() -> None:
+    """By the rule of the run's figure, for winches that the scene stops, and that samples do."""
+    campaign = with_motors(made_campaign(6))
+    assert campaign["cables_lower_winch_stop_time"].values[:2].tolist() == ["3.0", "none"]
+    campaign["cables_lower_winch_stop_time"].attrs["path"] = "cables.lower.winch.stop_time"
+    campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
+    lower = margin(campaign).axes[1]
+    ends = []
+    for line in lower.lines[:6]:
+        angle, known = line.get_xdata(), np.isfinite(line.get_ydata())
+        ends.append(angle[known][-1])
+    # Samples 0, 2 and 4 stop at 3 s, and the last record before is that of 2.5 s.
+    assert ends[::2] == pytest.approx([20.0 + 16.0 * 2.5] * 3, abs=1.1)
+    assert ends[1::2] == pytest.approx([180.0] * 3)
+    (legend,) = margin(campaign).legends
+    told = " ".join(legend.get_title().get_text().split())
+    assert "Curves end where a winch stops, in 3 samples" in told
+    scene = load_scene("ring18-motor").with_values(
+        {"structure.sections": SECTIONS, "cables.upper.winch.stop_time": 2.0}
+    )
+    times = stop_times(campaign.assign_attrs(scene=scene.to_toml()))
+    assert times["winch of the upper cable"] == 2.0
+    assert times["winch of the lower cable"].tolist() == [3.0, np.inf] * 3

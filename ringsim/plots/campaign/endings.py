@@ -25,8 +25,9 @@ from ringsim.plots.campaign.frame import (
     looks_of_cases,
     of_cases,
 )
-from ringsim.plots.drives_and_locks import least_rate, standard_of
+from ringsim.plots.drives_and_locks import least_rate, standard_of, stop_times
 from ringsim.plots.registry import picture
+from ringsim.tables import counted as number_of
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
 
@@ -125,6 +126,8 @@ def base_load(campaign: xr.Dataset) -> Figure:
     return figure
 
 
+_ZERO: dict[str, Any] = {"color": style.INK, "linewidth": 1.2, "linestyle": (0, (1, 1.5))}
+"""Look of a margin of 0: unlike any median's, whose dashes are longer."""
 _GOLDEN = 0.618034
 """Multiples of it fill a row evenly, whatever the number of marks."""
 _ANGLES = 161
@@ -136,7 +139,7 @@ _ANGLES = 161
 )  # fmt: skip
 def margin(campaign: xr.Dataset) -> Figure:
     """``least_drive_margin`` (sample) by ending; below, ``drive_margin`` (sample, time) over the
-    mean opening angle.
+    mean opening angle, as long as no winch has stopped: see ``stop_times``.
     """
     figure = Figure(figsize=(8.6, 6.2))
     upper, lower = figure.subplots(2, 1, height_ratios=(2, 3))
@@ -144,16 +147,24 @@ def margin(campaign: xr.Dataset) -> Figure:
     _strips(upper, campaign, samples, values)
     read, words = chosen(campaign, ["drive_margin", "opening_angle"])
     angles = read["opening_angle"].mean(("plane", "section")).transpose("sample", "time").to_numpy()
-    margins = read["drive_margin"].transpose("sample", "time").to_numpy()
-    rows = [_over_angle(*each) for each in zip(angles, margins, strict=True)]
+    margins = read["drive_margin"].transpose("sample", "time")
+    stops = stop_times(campaign.sel(sample=read["sample"])).values()
+    first = np.min(np.broadcast_arrays(np.full(len(words), np.inf), *stops), axis=0)
+    after = margins.notnull() & (read["time"] >= xr.DataArray(first, dims="sample"))
+    rows = [_over_angle(*each) for each in zip(angles, margins.where(~after).values, strict=True)]
     grid = angle_grid(rows)
     laid = np.array([laid_on(grid, *row) for row in rows])
     bands_by_ending(lower, grid, laid, words, looks_of_cases(campaign, read["sample"].values))
     style.margin_axis(lower, np.append(laid, values.min()), f"Margin by {standard_of(campaign)}")
-    lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    lower.axhline(0.0, **_ZERO)
     lower.set_xlabel("Mean opening angle (deg)")
     legend(figure, [lower], 4)
-    note = f"{counted(campaign, words)} Dashed: the margin of 0 that the standard requires."
+    note = f"{counted(campaign, words)} Dotted: the margin of 0 that the standard requires."
+    if cut := int(after.any("time").sum()):
+        note += (
+            f" Curves end where a winch stops, in {number_of(cut, 'sample')}: it holds its "
+            "plane, and there is no margin any more."
+        )
     head(figure, campaign, "Drive margin", note)
     return figure
 
@@ -176,7 +187,7 @@ def _strips(axes: Axes, campaign: xr.Dataset, samples: Array, values: Array) -> 
                       color=style.VERMILLION, fontsize=9,
                       xycoords=axes.get_xaxis_transform())  # fmt: skip
     if values.size and values.min() < 0.0 < values.max():
-        axes.axvline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+        axes.axvline(0.0, **_ZERO)
     axes.set_xlabel(style.label(campaign["least_drive_margin"]))
 
 
