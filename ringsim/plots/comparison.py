@@ -11,12 +11,12 @@ from matplotlib.ticker import PercentFormatter
 from ringsim.analysis.comparison import paired
 from ringsim.analysis.comparison_text import differing, names_of
 from ringsim.analysis.courses import deployed, names_of_ends
-from ringsim.analysis.design import blocks, endings, population_of, scalars, values_of
+from ringsim.analysis.design import blocks, endings, population_of, scalars
 from ringsim.analysis.intervals import good, numbers, tells_of, used
 from ringsim.analysis.residuals import Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import base_of, legend, limits, of_cases
+from ringsim.plots.campaign.frame import at_or_below, base_of, legend, limits, of_cases
 from ringsim.tables import (
     estimate_text,
     interval_text,
@@ -129,10 +129,8 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
         counts = []
         for each, called, (colour, dashes) in zip(both, names_of(found), _LOOKS, strict=True):
-            ordered = np.sort(values_of(each, name)[1])
-            of = int(tells_of(each, name).sum())
-            counts.append(f"{len(ordered)} of {of}")
-            share = np.arange(len(ordered) + 1) / of
+            ordered, share = at_or_below(each, name)
+            counts.append(f"{len(ordered)} of {int(tells_of(each, name).sum())}")
             axes.step(np.append(ordered[:1], ordered), share, where="post", color=colour,
                       linestyle=dashes, label=called)  # fmt: skip
         wanted = dict.fromkeys(limit for each in both for limit in limits(each, name))

@@ -100,10 +100,11 @@ def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
     at = step.get_ydata()[step.get_xdata() <= limit.get_xdata()[0]][-1]
     found = analyse(campaign).sel(requirement="deployment_time")
     assert at == pytest.approx(float(found["probability"]))
-    # By numpy, with what never deployed beyond all times.
-    ran = np.append(times[deployed], np.full(3, 1e9))
-    np.testing.assert_allclose(dots.get_xdata(), np.quantile(ran, [0.05, 0.5]))
-    assert dots.get_ydata().tolist() == [0.05, 0.5]
+    # Quantiles are those of the table, at the height that the curve has there.
+    told = analyse(campaign)["deployment_time"]
+    names = ["quantile_05", "median", "quantile_95"]
+    np.testing.assert_allclose(dots.get_xdata(), told.sel(statistic=names))
+    np.testing.assert_allclose(dots.get_ydata(), np.array([0.05, 0.5, 0.95]) * 15 / 18)
     assert "did not happen in the other samples" in words(distributions(campaign))
     # A model that tells no time of what deployed is not an antenna that fails.
     campaign["outcome"][:] = int(Fate.DEPLOYED)
@@ -111,6 +112,31 @@ def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
         a for a in distributions(campaign).axes if a.get_xlabel().startswith("Time at which")
     )
     assert panel.lines[0].get_ydata()[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "bound", "below"),
+    [
+        ("least_latch_rate", {}, True), ("peak_latch_rate", {}, False),
+        ("least_latch_rate", {"max": 9.0}, False), ("peak_latch_rate", {"min": 0.1}, True),
+    ],
+)  # fmt: skip
+def test_what_did_not_happen_counts_on_the_bad_side_of_a_number(
+    name: str, bound: dict[str, float], below: bool
+) -> None:
+    """Of a ring whose latches were never met the least rate is no better than all others."""
+    campaign = made_campaign(10, stalled=(0, 5))
+    rates = np.where(np.isfinite(campaign["deployment_time"]), 1.0 + np.arange(10.0), np.nan)
+    campaign[name] = "sample", rates, {"units": "rad s-1", "long_name": "some rate"}
+    wanted = {name: bound | {"probability": 0.5, "confidence": 0.9}} if bound else {}
+    campaign.attrs["requirements"] = json.dumps(wanted)
+    (panel,) = (a for a in distributions(campaign).axes if a.get_xlabel().startswith("Some rate"))
+    step, dots = panel.lines[:2]
+    ends = [step.get_ydata()[0], step.get_ydata()[-1]]
+    assert ends == pytest.approx([0.2, 1.0] if below else [0.0, 0.8])
+    middle = np.nanmedian(rates)
+    assert dots.get_xdata()[1] == pytest.approx(middle)
+    assert dots.get_ydata()[1] == pytest.approx(0.6 if below else 0.4)
 
 
 def test_tension_by_span(mixed: xr.Dataset) -> None:

@@ -22,9 +22,10 @@ from ringsim.analysis.design import (
     scalars,
     values_of,
 )
-from ringsim.analysis.intervals import quantities, used, varies
+from ringsim.analysis.intervals import quantities, tells_of, used, varies
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import losses, one_at_a_time
+from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
 
 LOOKS = {
@@ -84,6 +85,21 @@ def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
     """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
     wanted = required_by(campaign.attrs)
     return wanted[name].limits if name in wanted else []
+
+
+def at_or_below(campaign: xr.Dataset, name: str) -> tuple[Array, Array]:
+    """Values of a number in order, and the share of samples at or below none of them, the first,
+    the second, ..., one more than there are values.
+
+    Samples that ended before what it is about happened count as worse than all values: below them
+    where small ones are bad, or a requirement forbids these alone.
+    """
+    values = np.sort(values_of(campaign, name)[1])
+    of = int(tells_of(campaign, name).sum())
+    forbidden = [word for word, _ in limits(campaign, name)]
+    small_is_bad = forbidden == ["min"] if forbidden else VARIABLES[name].badness < 0
+    below = (of - len(values)) * small_is_bad
+    return values, (below + np.arange(len(values) + 1)) / max(of, 1)
 
 
 MOST_PANELS = 9
