@@ -163,6 +163,16 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     assert places.tolist() == [0, 1] * 4
 
 
+def test_numbers_among_words_stand_by_size(mixed: xr.Dataset) -> None:
+    stops = ["8.0", "none", "24.0", "4.0", "-1.5", "1e2", "4.0", "none"]
+    made = mixed.assign(
+        cables_lower_winch_stop_time=mixed["cables_lower_winch_stop_time"].copy(data=stops)
+    )
+    places, labels = drawn(made["cables_lower_winch_stop_time"])
+    assert labels == ["-1.5", "4.0", "8.0", "24.0", "1e2", "none"]
+    assert [labels[int(place)] for place in places] == stops
+
+
 @pytest.mark.parametrize("count", [2, 3, 4, 7])
 def test_words_of_inputs_are_whole_and_stand_apart(count: int) -> None:
     campaign = made_campaign(8)

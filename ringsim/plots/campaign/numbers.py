@@ -1,5 +1,6 @@
 """Main numbers of all samples: distributions, convergence, by input, the tail."""
 
+import math
 import textwrap
 from collections.abc import Mapping
 from typing import Any
@@ -265,7 +266,7 @@ def _has_run(campaign: xr.Dataset) -> bool:
 
 def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     """An input as one number a sample: the mean of its places, or the place of its word in the
-    list that comes second, which is empty for numbers.
+    list that comes second, which is empty for numbers: numbers by size, then words.
     """
     values = variable.to_numpy()
     if values.dtype.kind not in "OU":
@@ -273,8 +274,16 @@ def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
         return (numbers if numbers.ndim == 1 else numbers.mean(axis=1)), []
     rows = values.reshape(len(values), -1).astype(str)
     texts = np.array([", ".join(dict.fromkeys(row.tolist())) for row in rows])
-    words, places = np.unique(texts, return_inverse=True)
-    return places.astype(float), words.tolist()
+    place = {word: k for k, word in enumerate(sorted(set(texts.tolist()), key=_size))}
+    return np.array([place[text] for text in texts.tolist()], dtype=float), [*place]
+
+
+def _size(text: str) -> tuple[float, str]:
+    """By what the texts of an input that may be a word are ordered."""
+    try:
+        return float(text), text
+    except ValueError:
+        return math.inf, text
 
 
 @picture(
