@@ -11,12 +11,12 @@ from matplotlib.ticker import PercentFormatter
 from ringsim.analysis.comparison import paired
 from ringsim.analysis.comparison_text import differing, names_of
 from ringsim.analysis.courses import deployed, names_of_ends
-from ringsim.analysis.design import blocks, endings, population_of, scalars
+from ringsim.analysis.design import blocks, endings, population_of, scalars, values_of
 from ringsim.analysis.intervals import good, numbers, tells_of, used
 from ringsim.analysis.residuals import Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import at_or_below, base_of, legend, limits, of_cases
+from ringsim.plots.campaign.frame import APART, at_or_below, base_of, legend, limits, of_cases
 from ringsim.tables import (
     estimate_text,
     interval_text,
@@ -59,18 +59,38 @@ def _figures(
     both = population_of(first), population_of(second)
     if "sample" in first.dims:
         known = [set(scalars(each)) for each in both]
-        names = [n for n in differing(found) if all(n in each for each in known)]
+        every = [n for n in differing(found) if all(n in each for each in known)]
+        names = [n for n in every if not _still(both, n)] or every
+        unmoved = [n for n in every if n not in names]
         if names and found.attrs["pairs"]:
             words = "How far the samples of each pair differ"
-            yield "differences", words, pairs(found, both, names)
+            yield "differences", words, _noted(pairs(found, both, names), unmoved)
         if names:
-            yield "values", "Distribution of each main number in both", values(found, both, names)
+            words = "Distribution of each main number in both"
+            yield "values", words, _noted(values(found, both, names), unmoved)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
     until = max(_last(each) for each in both)
     drawn = {name: [_course(each, name, until) for each in both] for name in names}
     read = {n: rows for n, rows in drawn.items() if all(np.isfinite(r).any() for _, r in rows)}
     if read:
         yield "courses", "Courses over time in both", courses(found, both, read)
+
+
+def _still(both: Both, name: str) -> bool:
+    """Whether all values of both are the same to a thousandth, and nothing is required of them."""
+    every = np.concatenate([values_of(each, name)[1] for each in both])
+    wanted = any(limits(each, name) for each in both)
+    return bool(every.size) and not wanted and np.ptp(every) < APART * np.abs(every).max()
+
+
+def _noted(figure: Figure, unmoved: list[str]) -> Figure:
+    """A figure that says below its panels which numbers have none."""
+    if unmoved:
+        words = f"Not drawn, because samples differ by less than {100 * APART:g} %: "
+        words = textwrap.fill(words + ", ".join(unmoved), int(12.0 * figure.get_figwidth()))
+        figure.legends[0].set_title(words)
+        figure.legends[0].get_title().set_fontsize(9)
+    return figure
 
 
 @style.styled

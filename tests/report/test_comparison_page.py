@@ -174,6 +174,23 @@ def test_titles_of_figures_fit_their_sheets(both: tuple[xr.Dataset, xr.Dataset])
             assert text.get_window_extent().x1 < figure.bbox.x1
 
 
+def test_what_is_nearly_the_same_in_both_has_no_panel(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    """Its differences would be those of the last digits that tables give."""
+    one, other = (each.copy(deep=True) for each in both)
+    for each, power in ((one, 3.0), (other, 3.001)):
+        values = power + 1e-4 * np.arange(8.0)
+        each["peak_motor_power"] = "sample", values, {"units": "W", "long_name": "motor power"}
+    for _, _, figure in itertools.islice(figures_of_both(compare(one, other), one, other), 2):
+        assert not any("Motor power" in axes.get_xlabel() for axes in figure.axes)
+        told = " ".join(figure.legends[0].get_title().get_text().split())
+        assert told == "Not drawn, because samples differ by less than 0.1 %: peak_motor_power"
+    other["peak_motor_power"] += 0.01
+    drawn = {name: each for name, _, each in figures_of_both(compare(one, other), one, other)}
+    assert any("Motor power" in axes.get_xlabel() for axes in drawn["values"].axes)
+
+
 def test_differences_have_their_unit_and_labels_stand_apart(
     both: tuple[xr.Dataset, xr.Dataset],
 ) -> None:

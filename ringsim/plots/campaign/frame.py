@@ -104,7 +104,7 @@ def at_or_below(campaign: xr.Dataset, name: str) -> tuple[Array, Array]:
 
 MOST_PANELS = 9
 """Of a sheet: more could not be read."""
-_APART = 1e-3
+APART = 1e-3
 """Range of a number over its size below which a panel of its own shows nothing: no digit of it that
 tables give changes."""
 
@@ -123,21 +123,28 @@ def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tupl
         if name in campaign and name in quantities() and name not in names
         and len(values_of(campaign, name)[1])
     ]  # fmt: skip
-    known = {name: values_of(campaign, name)[1] for name in names}
-    several = [name for name in names if name not in limited and len(known[name]) > 1]
-    flat = [
-        name for name in several
-        if np.ptp(known[name]) < _APART * np.abs(known[name]).max() or not varies(campaign, name)
-    ]  # fmt: skip
-    told = ""
-    if flat and len(flat) < len(names):
-        within = f"by less than {100 * _APART:g} %, or than their numerical error"
-        told = f" Not drawn, because samples differ {within}: {', '.join(flat)}."
-        names = [name for name in names if name not in flat]
+    flat, told = still(campaign, names)
+    names = [name for name in names if name not in flat]
     if len(names) > most:
         names.sort(key=lambda name: name not in limited)
         told += f" Not drawn for want of room: {what}{', '.join(names[most:])}."
     return names[:most], told
+
+
+def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
+    """Those of some numbers that differ so little between samples that no figure shows it, and a
+    sentence that says so; none if all do, or where something is required of them.
+    """
+    limited = required_by(campaign.attrs)
+    known = {name: values_of(campaign, name)[1] for name in names if name not in limited}
+    flat = [
+        name for name, values in known.items() if len(values) > 1
+        and (np.ptp(values) < APART * np.abs(values).max() or not varies(campaign, name))
+    ]  # fmt: skip
+    if not flat or len(flat) == len(names):
+        return [], ""
+    within = f"by less than {100 * APART:g} %, or than their numerical error"
+    return flat, f" Not drawn, because samples differ {within}: {', '.join(flat)}."
 
 
 def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:

@@ -30,7 +30,16 @@ from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import one_at_a_time
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import MOST_PANELS, head, in_lines, legend, looks_of, moves, short
+from ringsim.plots.campaign.frame import (
+    MOST_PANELS,
+    head,
+    in_lines,
+    legend,
+    looks_of,
+    moves,
+    short,
+    still,
+)
 from ringsim.plots.registry import picture
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted, unit_behind
@@ -201,6 +210,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
     # Those that something is required of first: a page has no room for all.
     wanted = required_by(campaign.attrs)
     every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
+    flat, unmoved = still(population_of(campaign), scalars(campaign))
+    every = [each for each in every if each[0] not in flat]
     quiet = [name for name, bars in every if bars.measure and not bars.names]
     every = [each for each in every if each[0] not in quiet]
     found = every[:MOST_PANELS]
@@ -242,8 +253,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
     if quiet:
         caption += f" No significant input for {', '.join(quiet)}."
     if others := [name for name, _ in every[MOST_PANELS:]]:
-        caption += f" Not drawn: {', '.join(others)}."
-    head(figure, campaign, "What matters", caption)
+        caption += f" Not drawn for want of room: {', '.join(others)}."
+    head(figure, campaign, "What matters", caption + unmoved)
     return figure
 
 
