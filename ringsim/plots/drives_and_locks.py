@@ -16,7 +16,7 @@ from ringsim.layout.points import points_of
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.registry import picture
-from ringsim.scene import scene_from_toml
+from ringsim.scene import Scene, scene_from_toml
 
 _SOURCES = (
     style.SKY, style.ORANGE, style.GREEN, style.VERMILLION, style.PURPLE, style.BLUE, style.GREY,
@@ -153,30 +153,43 @@ def motors(dataset: xr.Dataset) -> Figure:
 
 
 def _moves(dataset: xr.Dataset) -> bool:
+    if "base_rotation" not in dataset:
+        return False
     return style.largest_magnitude(dataset["base_rotation"]) > _STILL
 
 
 _STILL = 1e-6
 """Turn of a base that is none, degree."""
+_LOADS = ("base_force", "base_torque")
 
 
-@picture("run", 118, "Attitude and place of the spacecraft", ("base_rotation",), _moves)
+def _based(dataset: xr.Dataset) -> bool:
+    return _moves(dataset) or bool(_loads(dataset))
+
+
+def _loads(dataset: xr.Dataset) -> list[xr.DataArray]:
+    return [dataset[name] for name in _LOADS
+            if name in dataset and np.isfinite(dataset[name]).any()]  # fmt: skip
+
+
+@picture("run", 118, "Attitude and place of the base, force and torque on it", applies=_based)
 def base(dataset: xr.Dataset) -> Figure:
-    """``base_rotation`` (axis, time) and, where positions are recorded, how far the boom's upper
-    end has moved since the start; a line an axis.
+    """Of a base that moves ``base_rotation`` (axis, time) and, where positions are recorded, how
+    far the boom's upper end has moved since the start; ``base_force`` and ``base_torque`` where
+    they are recorded.  A line an axis.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    shown = [dataset["base_rotation"].assign_attrs(long_name="rotation vector since the start")]
-    if "position" in dataset:
-        layout = layout_of(scene)
-        points = points_of(layout, scene.structure.planes)
-        name = next(
-            name for name, at in zip(points.names, points.mounts, strict=True)
-            if isinstance(at, OnBody) and at.body == layout.base and not at.arm.any()
-        )  # fmt: skip
-        place = dataset["position"].sel(point=name)
-        words = "way of the boom's upper end since the start"
-        shown.append((place - place.isel(time=0)).assign_attrs(units="m", long_name=words))
+    shown, told, body = [], list[str](), "base"
+    if _moves(dataset):
+        words = "rotation vector since the start"
+        shown, told = [dataset["base_rotation"].assign_attrs(long_name=words)], ["attitude"]
+        body = "spacecraft" if scene.spacecraft is not None else "free base"
+        if "position" in dataset:
+            shown.append(_way(dataset, scene))
+            told.append("place")
+    loads = _loads(dataset)
+    shown += loads
+    told += [str(each.name).removeprefix("base_") for each in loads]
     figure = Figure(figsize=(8.4, 2.5 * len(shown) + 1.3))
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axes, values in zip(panels, shown, strict=True):
@@ -187,11 +200,24 @@ def base(dataset: xr.Dataset) -> Figure:
         axes.set_ylabel(style.label(values, width=30), fontsize=9)
         axes.margins(y=0.12)
     figure.align_ylabels(panels)
-    style.time_axes(dataset, dataset["base_rotation"], *panels)
+    style.time_axes(dataset, shown[0], *panels)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    body = "spacecraft" if scene.spacecraft is not None else "free base"
-    style.head(figure, panels[0], dataset, f"Attitude and place of the {body}")
+    subject = " and ".join(filter(None, [", ".join(told[:-1]), told[-1]]))
+    style.head(figure, panels[0], dataset, f"{subject.capitalize()} of the {body}")
     return figure
+
+
+def _way(dataset: xr.Dataset, scene: Scene) -> xr.DataArray:
+    """How far the boom's upper end has moved since the start, (axis, time), m."""
+    layout = layout_of(scene)
+    points = points_of(layout, scene.structure.planes)
+    name = next(
+        name for name, at in zip(points.names, points.mounts, strict=True)
+        if isinstance(at, OnBody) and at.body == layout.base and not at.arm.any()
+    )  # fmt: skip
+    place = dataset["position"].sel(point=name)
+    words = "way of the boom's upper end since the start"
+    return (place - place.isel(time=0)).assign_attrs(units="m", long_name=words)
 
 
 _LINES = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE)

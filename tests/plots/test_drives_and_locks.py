@@ -97,15 +97,27 @@ def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
     }  # fmt: skip
     run = simulate(load_scene("ring18-cable").with_values(values))
     ((_, figure),) = figures_of(run, "base")
-    turn, place = figure.axes
+    turn, _, force, _ = figure.axes
     known = run["base_rotation"].dropna("time")
     way = run["position"].sel(point="upper corner 1").dropna("time")
-    for axes, wanted in ((turn, known), (place, way - way[..., 0])):
+    loads = (run[name].dropna("time") for name in ("base_force", "base_torque"))
+    drawn = zip(figure.axes, (known, way - way[..., 0], *loads), strict=True)
+    for axes, wanted in drawn:
         for row, line in zip(wanted.transpose("axis", "time").values, axes.lines, strict=False):
             assert line.get_ydata()[: len(row)] == pytest.approx(row)
-    assert "spacecraft" in figure.get_suptitle()
+    assert "(deg)" in turn.get_ylabel()
+    assert "(N)" in force.get_ylabel()
+    told = "Attitude, place, force and torque of the spacecraft"
+    assert " ".join(figure.get_suptitle().split()).startswith(told)
+    # The title tells no more than there is.
     still = run.assign(base_rotation=0.0 * run["base_rotation"])
-    assert not list(figures_of(still, "base"))
+    ((_, figure),) = figures_of(still, "base")
+    assert figure.get_suptitle().startswith("Force and torque of the base")
+    assert len(figure.axes) == 2
+    bare = run.drop_vars(["base_force", "base_torque", "position"])
+    ((_, figure),) = figures_of(bare, "base")
+    assert figure.get_suptitle().startswith("Attitude of the spacecraft")
+    assert not list(figures_of(still.drop_vars(["base_force", "base_torque"]), "base"))
 
 
 def test_motors_of_a_run_have_a_panel_a_quantity(campaign: xr.Dataset) -> None:
