@@ -16,7 +16,15 @@ from ringsim.analysis.intervals import good, numbers, tells_of, used
 from ringsim.analysis.residuals import Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import APART, at_or_below, base_of, legend, limits, of_cases
+from ringsim.plots.campaign.frame import (
+    APART,
+    at_or_below,
+    base_of,
+    legend,
+    limits,
+    of_cases,
+    shown_until,
+)
 from ringsim.tables import (
     estimate_text,
     interval_text,
@@ -69,7 +77,7 @@ def _figures(
             words = "Distribution of each main number in both"
             yield "values", words, _noted(values(found, both, names), unmoved)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
-    until = max(_last(each) for each in both)
+    until = _until(both)
     drawn = {name: [_course(each, name, until) for each in both] for name in names}
     read = {n: rows for n, rows in drawn.items() if all(np.isfinite(r).any() for _, r in rows)}
     if read:
@@ -198,12 +206,17 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         if name != "opening_angle":
             style.span_sizes(axes, np.concatenate([each.ravel() for each in drawn]))
     grid[-1].set_xlabel(style.label(both[0]["time"]))
-    grid[0].set_xlim(0.0, max(_last(each) for each in both))
+    grid[0].set_xlim(0.0, _until(both))
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
     if not single:
         told = dict.fromkeys(_BANDS_OF[of_cases(each)] for each in both)
-        figure.legends[0].set_title("\n".join([*told, _OVER]))
+        cut = [
+            f"{called}: {ran_on.partition(': ')[2]}"
+            for each, called in zip(both, names_of(found), strict=True)
+            if (ran_on := shown_until(each)[1]) and _last(each) > _until(both)
+        ]  # fmt: skip
+        figure.legends[0].set_title("\n".join([*told, _OVER, *cut]))
         figure.legends[0].get_title().set_fontsize(9)
     return figure
 
@@ -219,6 +232,14 @@ _OVER = (
 )
 _DEPLOYED = {"opening_angle": 180.0, "asynchrony": 0.0}
 """What a deployed ring has: its last record may be before its last lock."""
+
+
+def _until(both: Both) -> float:
+    """Time up to which courses of both are drawn, s."""
+    return max(
+        min(_last(each), shown_until(each)[0]) if "sample" in each.dims else _last(each)
+        for each in both
+    )
 
 
 def _last(dataset: xr.Dataset) -> float:

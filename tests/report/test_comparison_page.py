@@ -153,6 +153,19 @@ def test_what_is_over_counts_on_in_the_courses(both: tuple[xr.Dataset, xr.Datase
     assert "After its end a run counts on" in figure.legends[0].get_title().get_text()
 
 
+def test_a_sample_that_runs_on_ends_no_axis_of_a_comparison() -> None:
+    one, other = made_campaign(30, stalled=(7,)), made_campaign(30)
+    late = np.arange(30) == 7
+    one["deployment_time"][:] = np.where(late, np.nan, 4.0)
+    one["final_time"][:] = np.where(late, 10.0, 4.0)
+    other["deployment_time"][:], other["final_time"][:] = 6.0, 6.0
+    found = compare(one, other, ("ground", "flight"))
+    drawn = {name: figure for name, _, figure in figures_of_both(found, one, other)}
+    assert drawn["courses"].axes[0].get_xlim() == pytest.approx((0.0, 6.0))
+    told = drawn["courses"].legends[0].get_title().get_text()
+    assert told.endswith("\nground: 1 sample goes on, until 10 s.")
+
+
 def test_samples_that_were_cut_off_are_told_and_what_differs_comes_first(
     both: tuple[xr.Dataset, xr.Dataset],
 ) -> None:

@@ -24,6 +24,7 @@ from ringsim.plots.campaign.frame import (
     looks_of,
     looks_of_cases,
     of_cases,
+    shown_until,
 )
 from ringsim.plots.drives_and_locks import least_rate, standard_of, stop_times
 from ringsim.plots.registry import picture
@@ -87,16 +88,18 @@ def bands_by_ending(
 
 def over_time(
     figure: Figure, panels: Sequence[Axes], campaign: xr.Dataset, curves: Sequence[Array],
-    words: NDArray[np.str_], cases: Looks,
+    words: NDArray[np.str_], cases: Looks, until: float,
 ) -> None:  # fmt: skip
-    """A panel a set of curves (sample, time), up to the last time at which any is known."""
+    """A panel a set of curves (sample, time), up to the last time at which any is known, and not
+    beyond one, s.
+    """
     time = campaign["time"].to_numpy()
     last = 0
     for axes, values in zip(panels, curves, strict=True):
         bands_by_ending(axes, time, values, words, cases)
         if (known := np.flatnonzero(np.isfinite(values).any(axis=0))).size:
             last = max(last, int(known[-1]))
-    panels[0].set_xlim(time[0], time[max(last, 1)])
+    panels[0].set_xlim(time[0], min(time[max(last, 1)], until))
     panels[-1].set_xlabel(style.label(campaign["time"]))
     legend(figure, panels, 4)
 
@@ -120,8 +123,9 @@ def base_load(campaign: xr.Dataset) -> Figure:
         axes.set_ylabel(style.label(parts.assign_attrs(long_name=text), width=30))
         style.span_sizes(axes, curves[-1])
     cases = looks_of_cases(campaign, read["sample"].values)
-    over_time(figure, panels, read, curves, words, cases)
-    note = f"{counted(campaign, words)} At recorded times: peaks may be higher."
+    until, ran_on = shown_until(campaign)
+    over_time(figure, panels, read, curves, words, cases, until)
+    note = f"{counted(campaign, words)}{ran_on} At recorded times: peaks may be higher."
     head(figure, campaign, "What the base carries", note)
     return figure
 
@@ -245,9 +249,10 @@ def motors(campaign: xr.Dataset) -> Figure:
             axes.set_title(name, fontsize=9.5)
             axes.set_ylabel(style.label(read[what], width=22), fontsize=9)
     cases = looks_of_cases(campaign, read["sample"].values)
-    over_time(figure, grid.ravel().tolist(), read, curves, words, cases)
+    until, ran_on = shown_until(campaign)
+    over_time(figure, grid.ravel().tolist(), read, curves, words, cases, until)
     grid[-1, 0].set_xlabel(style.label(read["time"]))
-    head(figure, campaign, "Motors", counted(campaign, words))
+    head(figure, campaign, "Motors", counted(campaign, words) + ran_on)
     return figure
 
 

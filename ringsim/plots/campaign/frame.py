@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ringsim.analysis.courses import QUANTILES
+from ringsim.analysis.courses import QUANTILES, ends
 from ringsim.analysis.design import (
     called,
     endings,
@@ -22,7 +22,7 @@ from ringsim.analysis.design import (
     scalars,
     values_of,
 )
-from ringsim.analysis.intervals import quantities, tells_of, used, varies
+from ringsim.analysis.intervals import good, quantities, tells_of, used, varies
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import losses, one_at_a_time
 from ringsim.outputs.family import VARIABLES, Array
@@ -167,6 +167,24 @@ def entries(figure: Figure, handles: Sequence[Any], words: Sequence[str], column
 
 _LETTER, _HANDLE = 0.085, 0.65
 """Widths in inch of a letter of a legend, and of its line and the blanks around it."""
+
+
+_NEARLY_ALL, _FURTHER = 0.95, 1.25
+"""Share of the samples that are over where time axes may end, and how much later they do."""
+
+
+def shown_until(campaign: xr.Dataset) -> tuple[float, str]:
+    """Time (s) up to which courses are drawn, and a sentence on samples that ran on: a few that
+    stall need not squeeze all others.  Infinity and nothing where no sample does.
+    """
+    if not {"final_time", "deployment_time"} <= set(campaign.data_vars):
+        return np.inf, ""
+    over = ends(campaign)[good(campaign)]
+    until = _FURTHER * np.quantile(over, _NEARLY_ALL, method="higher") if over.size else np.inf
+    if not (later := int((over > until).sum())):
+        return np.inf, ""
+    left = "1 sample goes" if later == 1 else f"{later} samples go"
+    return float(until), f" Time ends at {until:.3g} s: {left} on, until {over.max():.4g} s."
 
 
 def bands(values: NDArray[np.floating]) -> NDArray[np.floating]:
