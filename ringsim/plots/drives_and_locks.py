@@ -246,7 +246,7 @@ def locks(dataset: xr.Dataset) -> Figure:
         axes.set_ylabel(style.label(about, width=20), fontsize=9)
         axes.margins(y=0.15)
         if name != "lock_time":
-            axes.set_ylim(bottom=0.0)
+            style.from_zero(axes)
     entries = [
         Line2D([], [], linestyle="none", marker=marker, color=colour, label=f"{plane} plane")
         for plane, (marker, colour) in zip(planes, _MARKS, strict=False)

@@ -395,6 +395,11 @@ def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
     plain_numbers(axes.yaxis)
 
 
+def from_zero(axes: Axes) -> None:
+    """Value axis from zero with room above for whole markers, however alike the values are."""
+    axes.set_ylim(0.0, 1.08 * axes.get_ylim()[1])
+
+
 def signed_sizes(axes: Axes, sizes: np.ndarray) -> None:
     """Value axis of both signs; logarithmic on either side where most would be a flat line.
 

@@ -147,6 +147,10 @@ def test_tension_by_span(mixed: xr.Dataset) -> None:
         np.testing.assert_allclose(middle.get_ydata(), 23.0 / spans)
         np.testing.assert_allclose(axes.lines[1].get_ydata(), 26.0 / spans)
     assert "largest tension: sample 6" in words(figure)
+    figure.draw_without_rendering()
+    low, high = figure.axes[-1].get_xlim()
+    shown = [tick for tick in figure.axes[-1].get_xticks() if low <= tick <= high]
+    assert (shown[0], shown[-1]) == (spans[0], spans[-1])
 
 
 def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:

@@ -89,6 +89,19 @@ def test_locks_of_a_run_stand_by_section(campaign: xr.Dataset) -> None:
     assert len(locks(run.drop_vars(["latch_rate", "lock_impulse"])).axes) == 1
 
 
+def test_marks_that_are_nearly_alike_are_whole(campaign: xr.Dataset) -> None:
+    """Impulses of all V-joints within a hundredth, in a run and in a campaign."""
+    campaign["lock_impulse"] = 10.6 + 1e-2 * campaign["lock_impulse"] / 20.0
+    for figure in (locks(campaign.isel(sample=3, drop=True)), lock_impulse(campaign)):
+        figure.draw_without_rendering()
+        axes = figure.axes[2 if len(figure.axes) == 3 else 0]
+        most = max(np.nanmax(line.get_ydata()) for line in axes.lines)
+        radius = max(line.get_markersize() for line in axes.lines) * figure.dpi / 144.0
+        top = axes.transData.transform((0.0, most))[1] + radius
+        assert top < axes.get_window_extent().y1
+        assert axes.get_ylim()[0] == 0.0
+
+
 def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
     craft = {"mass": 20.0, "inertia": [3.0, 3.0, 2.0]}
     values = {

@@ -296,7 +296,7 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
                          label=f"latches catch from {least:.3g} rad/s on")  # fmt: skip
         axes.set_title(f"{plane} plane", fontsize=9.5)
         axes.grid(visible=False, axis="x")
-    grid[0].set_ylim(bottom=0.0)
+    style.from_zero(grid[0])
     grid[0].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)
     grid[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     grid[-1].set_xlabel(style.label(campaign["section"]))
@@ -356,7 +356,9 @@ def tension(campaign: xr.Dataset) -> Figure:
         style.draw_limit(axes, limit, f"limits.tension = {limit:g} N")
         axes.set_title(f"{plane} cable", fontsize=9.5)
         axes.xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
-    grid[0].set_ylim(bottom=0.0)  # all panels share it
+    style.from_zero(grid[0])  # all panels share it
+    spans = found["span"].values
+    grid[0].set_xlim(spans[0] - 0.6, spans[-1] + 0.6)  # there is no span 0
     grid[-1].set_xlabel(style.label(campaign["span"]))
     figure.supylabel(style.label(found.assign_attrs(long_name="largest recorded tension")),
                      fontsize=10.5)  # fmt: skip
