@@ -280,7 +280,10 @@ def heading(dataset: xr.Dataset, subject: str, inches: float) -> tuple[str, str]
     lines = len(textwrap.wrap(words, width))
     # The narrowest text with as few lines: all are about equally long.
     fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
-    end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
+    told, wide = ending(dataset), int(11.5 * inches)
+    while len(textwrap.wrap(told, wide)) > 2 and "; " in told:
+        told = told.rpartition("; ")[0]  # what follows from it, which tables tell
+    end = textwrap.wrap(told, wide, max_lines=2, placeholder=" ...")
     return textwrap.fill(words, next(fitting, width)), "\n".join(end)
 
 

@@ -398,6 +398,17 @@ def test_a_long_ending_stands_clear_of_what_is_above_the_axes(deployed):
     assert not ending.overlaps(lock.get_window_extent())
 
 
+def test_an_ending_that_is_too_long_ends_with_a_clause(deployed):
+    why = "came to rest with 12 of 24 V-joints locked, none of the lower plane: no winch turns, and"
+    why += " within 12 s no V-joint has moved by more than 0.57 deg"
+    then = "steps of 47.2 ms at the lock at 25.3304 s are too long for shocks in the rods"
+    long = deployed.assign(outcome=int(Fate.PARTLY_DEPLOYED))
+    long.attrs = long.attrs | {"reason": f"{why}; {then}"}
+    for inches, last in ((8.0, why), (14.0, then)):
+        told = " ".join(style.heading(long, "Locks", inches)[1].split())
+        assert told.endswith(last)
+
+
 def test_a_structure_without_joints_between_rods_is_told_what_is_not_drawn(
     deployed: xr.Dataset,
 ) -> None:
