@@ -21,6 +21,7 @@ from ringsim.plots.registry import jointed, picture
 from ringsim.plots.run import Peak, peak_of
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import Shape, Track, places_at, shape_of
+from ringsim.tables import unit_text
 
 Array = NDArray[np.float64]
 
@@ -179,7 +180,7 @@ def _caption(axes: Axes, middle: float, name: str, angles: xr.DataArray) -> None
     time = angles["time"]
     numbers = (
         f"{float(time):.2f} {time.attrs['units']}\n"
-        f"mean opening angle {float(angles.mean()):.1f} {angles.attrs['units']}"
+        f"mean opening angle {float(angles.mean()):.1f} {unit_text(angles.attrs['units'])}"
     )
     for text, drop, weight in ((name, 12, "bold"), (numbers, 28, "normal")):
         axes.annotate(

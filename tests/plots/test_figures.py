@@ -409,6 +409,11 @@ def test_an_ending_that_is_too_long_ends_with_a_clause(deployed):
         assert told.endswith(last)
 
 
+def test_angles_have_one_unit_in_all_figures_of_a_run(deployed):
+    for each, figure in figures_of(deployed):
+        assert "degree" not in words(figure), each.name
+
+
 def test_a_structure_without_joints_between_rods_is_told_what_is_not_drawn(
     deployed: xr.Dataset,
 ) -> None:

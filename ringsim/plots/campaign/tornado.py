@@ -237,7 +237,7 @@ def tornado(campaign: xr.Dataset) -> Figure:
         words = style.label(campaign[output], "1", 42) if output in campaign else output
         axes.set_title(words, fontsize=9.5, color=style.INK)
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
-        unit = f" ({units})" if bars.measure == "mean_absolute_effect" and units != "1" else ""
+        unit = unit_behind("", units) if bars.measure == "mean_absolute_effect" else ""
         below = f"\n{bars.told}" if bars.told and bars.names else ""
         if bars.names:
             two = np.isfinite(bars.inside).any() and bars.measure in _INSIDE
