@@ -231,7 +231,8 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     mark(whole, peak, str(values.attrs.get("units", "")), f"{laggard} behind {leader}")
     if peak.time >= begin:
         close.plot(peak.time, peak.value, "o", color=style.VERMILLION, markersize=6, zorder=4)
-    style.name_panel(close, "the end, enlarged")
+    # Of runs whose joints wait for each other it may be half of the whole.
+    style.name_panel(close, f"from {begin:.3g} s on, enlarged")
     style.head(figure, whole, dataset, "Asynchrony")
     return figure
 

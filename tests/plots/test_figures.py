@@ -409,6 +409,13 @@ def test_an_ending_that_is_too_long_ends_with_a_clause(deployed):
         assert told.endswith(last)
 
 
+def test_the_enlarged_end_says_where_it_begins(deployed, unfinished):
+    for run in (deployed, unfinished):
+        _, close = asynchrony(run).axes
+        (told,) = (t.get_text() for t in close.texts if "enlarged" in t.get_text())
+        assert told == f"from {close.get_xlim()[0]:.3g} s on, enlarged"
+
+
 def test_angles_have_one_unit_in_all_figures_of_a_run(deployed):
     for each, figure in figures_of(deployed):
         assert "degree" not in words(figure), each.name
