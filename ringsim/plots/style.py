@@ -146,7 +146,7 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-_FIXED = "\u00a0"
+FIXED = "\u00a0"
 """A blank at which no line is broken."""
 
 
@@ -163,8 +163,8 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     words = str(variable.attrs.get("long_name", variable.name))
     units = str(variable.attrs.get("units", "1")) if units is None else units
     words = words[:1].upper() + words[1:]
-    held = unit_behind(words, units.replace(" ", _FIXED))
-    return textwrap.fill(held, width).replace(_FIXED, " ")
+    held = unit_behind(words, units.replace(" ", FIXED))
+    return textwrap.fill(held, width).replace(FIXED, " ")
 
 
 def unit_label(variable: xr.DataArray) -> str:

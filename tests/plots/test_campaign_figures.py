@@ -21,7 +21,7 @@ from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.outputs.family import VARIABLES
 from ringsim.plots import style
-from ringsim.plots.campaign import endings
+from ringsim.plots.campaign import endings, frame
 from ringsim.plots.campaign.courses import lock_order, shares
 from ringsim.plots.campaign.endings import angle_grid, base_load, laid_on, margin, motors, tension
 from ringsim.plots.campaign.frame import moves, shown
@@ -415,6 +415,13 @@ def test_panels_are_for_numbers_that_differ_or_have_limits() -> None:
     names, flat = shown(campaign)
     assert {"deployment_time", "latched_joints"} <= set(names)
     assert "deployment_time" not in flat
+
+
+def test_a_percentage_stays_on_its_line(mixed: xr.Dataset) -> None:
+    for length in range(60, 120):
+        figure = Figure(figsize=(8.0, 4.0))
+        frame.head(figure, mixed, "Any", f"{'x' * length} by less than 0.1 % of it " + "y " * 80)
+        assert not [line for line in figure.get_supxlabel().split("\n") if line.startswith("%")]
 
 
 def test_a_sheet_has_the_panels_that_matter_and_names_the_others() -> None:

@@ -61,7 +61,9 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
     if (lost := losses(campaign)).note:
         subject += lost.mark
         caption += f"\n{lost.mark.strip()} {lost.note[0].upper()}{lost.note[1:]}."
-    words = "\n".join(textwrap.fill(each, int(12.0 * inches)) for each in caption.split("\n"))
+    held = caption.replace(" %", f"{style.FIXED}%")
+    words = "\n".join(textwrap.fill(each, int(12.0 * inches)) for each in held.split("\n"))
+    words = words.replace(style.FIXED, " ")
     figure.set_figheight(figure.get_figheight() + _LINE * max(0, words.count("\n") - 1))
     name = str(campaign.attrs.get("title", "")).strip()
     style.title(figure, textwrap.fill(f"{subject}: {name}".rstrip(": "), int(10.3 * inches)))
