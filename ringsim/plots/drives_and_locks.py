@@ -10,7 +10,6 @@ from matplotlib.ticker import MaxNLocator
 
 from ringsim.analysis.design import inputs, paths_of
 from ringsim.choice import kind_of
-from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
 from ringsim.outputs.family import Array
@@ -210,12 +209,9 @@ def base(dataset: xr.Dataset) -> Figure:
 def _way(dataset: xr.Dataset, scene: Scene) -> xr.DataArray:
     """How far the boom's upper end has moved since the start, (axis, time), m."""
     layout = layout_of(scene)
+    assert layout.base is not None
     points = points_of(layout, scene.structure.planes)
-    name = next(
-        name for name, at in zip(points.names, points.mounts, strict=True)
-        if isinstance(at, OnBody) and at.body == layout.base and not at.arm.any()
-    )  # fmt: skip
-    place = dataset["position"].sel(point=name)
+    place = dataset["position"].sel(point=points.names[points.of_body(layout.base)])
     words = "way of the boom's upper end since the start"
     return (place - place.isel(time=0)).assign_attrs(units="m", long_name=words)
 
