@@ -147,10 +147,8 @@ def test_tension_by_span(mixed: xr.Dataset) -> None:
         np.testing.assert_allclose(middle.get_ydata(), 23.0 / spans)
         np.testing.assert_allclose(axes.lines[1].get_ydata(), 26.0 / spans)
     assert "largest tension: sample 6" in words(figure)
-    figure.draw_without_rendering()
-    low, high = figure.axes[-1].get_xlim()
-    shown = [tick for tick in figure.axes[-1].get_xticks() if low <= tick <= high]
-    assert (shown[0], shown[-1]) == (spans[0], spans[-1])
+    # However many spans there are, none has the number 0.
+    assert figure.axes[-1].get_xlim() == pytest.approx((spans[0] - 0.6, spans[-1] + 0.6))
 
 
 def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
@@ -500,6 +498,8 @@ def test_stress_has_the_numbers_of_its_unit_in_all_figures(kind: str) -> None:
                     figure.draw_without_rendering()
                     places = axis.get_majorticklocs()
                     told = axis.get_major_formatter().format_ticks(places)
-                    assert [float(text) for text in told] == pytest.approx(1e-6 * places)
+                    scale = float(axis.get_major_formatter().get_offset() or 1.0)
+                    numbers = [scale * float(text) for text in told]
+                    assert numbers == pytest.approx(1e-6 * places)
                     seen.add(picture.name)
     assert seen == ({"one_by_one"} if kind == "one-at-a-time" else {"distributions", "convergence"})
