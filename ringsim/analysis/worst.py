@@ -335,8 +335,13 @@ def _found(campaign: xr.Dataset, name: str, place: int) -> str:
     if np.isfinite(value):
         units = quantities()[name].units
         return with_unit(f"{value:.4g}", units)
-    why = str(campaign["reason"].to_numpy()[place]).split("; ")[0] if "reason" in campaign else ""
+    why = first_clause(str(campaign["reason"].to_numpy()[place])) if "reason" in campaign else ""
     return f"no value: {why}" if name else why
+
+
+def first_clause(reason: str) -> str:
+    """Why a run ended, without what follows from it."""
+    return reason.split("; ")[0]
 
 
 def command(folder: str, sample: int) -> str:

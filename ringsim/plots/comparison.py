@@ -17,7 +17,15 @@ from ringsim.analysis.posterior import UNEXPLAINED
 from ringsim.analysis.residuals import Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import base_of, legend, limits, of_cases
+from ringsim.plots.campaign.frame import (
+    APART,
+    at_or_below,
+    base_of,
+    legend,
+    limits,
+    of_cases,
+    shown_until,
+)
 from ringsim.tables import (
     estimate_text,
     interval_text,
@@ -61,18 +69,38 @@ def _figures(
     both = population_of(first), population_of(second)
     if "sample" in first.dims:
         known = [set(scalars(each)) for each in both]
-        names = [n for n in differing(found) if all(n in each for each in known)]
+        every = [n for n in differing(found) if all(n in each for each in known)]
+        names = [n for n in every if not _still(both, n)] or every
+        unmoved = [n for n in every if n not in names]
         if names and found.attrs["pairs"]:
             words = "How far the samples of each pair differ"
-            yield "differences", words, pairs(found, both, names)
+            yield "differences", words, _noted(pairs(found, both, names), unmoved)
         if names:
-            yield "values", "Distribution of each main number in both", values(found, both, names)
+            words = "Distribution of each main number in both"
+            yield "values", words, _noted(values(found, both, names), unmoved)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
-    until = max(_last(each) for each in both)
+    until = _until(both)
     drawn = {name: [_course(each, name, until) for each in both] for name in names}
     read = {n: rows for n, rows in drawn.items() if all(np.isfinite(r).any() for _, r in rows)}
     if read:
         yield "courses", "Courses over time in both", courses(found, both, read)
+
+
+def _still(both: Both, name: str) -> bool:
+    """Whether all values of both are the same to a thousandth, and nothing is required of them."""
+    every = np.concatenate([values_of(each, name)[1] for each in both])
+    wanted = any(limits(each, name) for each in both)
+    return bool(every.size) and not wanted and np.ptp(every) < APART * np.abs(every).max()
+
+
+def _noted(figure: Figure, unmoved: list[str]) -> Figure:
+    """A figure that says below its panels which numbers have none."""
+    if unmoved:
+        words = f"Not drawn, because samples differ by less than {100 * APART:g} %: "
+        words = textwrap.fill(words + ", ".join(unmoved), int(12.0 * figure.get_figwidth()))
+        figure.legends[0].set_title(words)
+        figure.legends[0].get_title().set_fontsize(9)
+    return figure
 
 
 @style.styled
@@ -131,10 +159,8 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
         counts = []
         for each, called, (colour, dashes) in zip(both, names_of(found), _LOOKS, strict=True):
-            ordered = np.sort(values_of(each, name)[1])
-            of = int(tells_of(each, name).sum())
-            counts.append(f"{len(ordered)} of {of}")
-            share = np.arange(len(ordered) + 1) / of
+            ordered, share = at_or_below(each, name)
+            counts.append(f"{len(ordered)} of {int(tells_of(each, name).sum())}")
             axes.step(np.append(ordered[:1], ordered), share, where="post", color=colour,
                       linestyle=dashes, label=called)  # fmt: skip
         wanted = dict.fromkeys(limit for each in both for limit in limits(each, name))
@@ -182,12 +208,17 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         if name != "opening_angle":
             style.span_sizes(axes, np.concatenate([each.ravel() for each in drawn]))
     grid[-1].set_xlabel(style.label(both[0]["time"]))
-    grid[0].set_xlim(0.0, max(_last(each) for each in both))
+    grid[0].set_xlim(0.0, _until(both))
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
     if not single:
         told = dict.fromkeys(_BANDS_OF[of_cases(each)] for each in both)
-        figure.legends[0].set_title("\n".join([*told, _OVER]))
+        cut = [
+            f"{called}: {ran_on.partition(': ')[2]}"
+            for each, called in zip(both, names_of(found), strict=True)
+            if (ran_on := shown_until(each)[1]) and _last(each) > _until(both)
+        ]  # fmt: skip
+        figure.legends[0].set_title("\n".join([*told, _OVER, *cut]))
         figure.legends[0].get_title().set_fontsize(9)
     return figure
 
@@ -203,6 +234,14 @@ _OVER = (
 )
 _DEPLOYED = {"opening_angle": 180.0, "asynchrony": 0.0}
 """What a deployed ring has: its last record may be before its last lock."""
+
+
+def _until(both: Both) -> float:
+    """Time up to which courses of both are drawn, s."""
+    return max(
+        min(_last(each), shown_until(each)[0]) if "sample" in each.dims else _last(each)
+        for each in both
+    )
 
 
 def _last(dataset: xr.Dataset) -> float:

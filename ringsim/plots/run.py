@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.registry import jointed, picture
-from ringsim.tables import known_to
+from ringsim.tables import known_to, unit_text, with_unit
 
 # The largest value of a run as a point of what is drawn: records stand at fixed times, so that
 # campaigns have one time axis, and a peak seldom falls on one.  Its value, time and place are
@@ -85,6 +85,7 @@ def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) ->
         return
     height = factor * peak.value
     told = known_to(f"{height:.3g}", factor * peak.error, exact=height)
+    units = unit_text(units)
     axes.plot(peak.time, height, "o", color=style.VERMILLION, markersize=6, zorder=4, clip_on=False)
     early = peak.time < 0.5 * sum(axes.get_xlim())
     style.free(axes.text(
@@ -126,7 +127,7 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
         style.time_axes(dataset, angle, upper, lower)
     _limits(grid, angle, deviation)
     grid[0, 0].set_ylabel(style.label(angle))
-    grid[1, 0].set_ylabel(f"Deviation from\nthe mean ({angle.attrs.get('units', '')})")
+    grid[1, 0].set_ylabel(f"Deviation from\nthe mean {style.unit_label(angle)}")
     figure.align_ylabels(grid[:, 0])
     if sections.size > 1:
         bar = figure.colorbar(lines, ax=grid, aspect=40, pad=0.015, label=style.label(sections))
@@ -230,7 +231,8 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     mark(whole, peak, str(values.attrs.get("units", "")), f"{laggard} behind {leader}")
     if peak.time >= begin:
         close.plot(peak.time, peak.value, "o", color=style.VERMILLION, markersize=6, zorder=4)
-    style.name_panel(close, "the end, enlarged")
+    # Of runs whose joints wait for each other it may be half of the whole.
+    style.name_panel(close, f"from {begin:.3g} s on, enlarged")
     style.head(figure, whole, dataset, "Asynchrony")
     return figure
 
@@ -343,7 +345,7 @@ def section_map(dataset: xr.Dataset) -> Figure:
     label = style.label(found, width=34)
     figure.colorbar(image, ax=grid, pad=0.015, label=label).outline.set_visible(False)
     figure.supylabel(style.label(dataset["section"]), fontsize=10.5)
-    size = f"{peak.value:.3g} {found.attrs.get('units', '')}"
+    size = with_unit(f"{peak.value:.3g}", str(found.attrs.get("units", "1")))
     words = {"^": f"leader at the largest asynchrony, {size}", "v": "laggard"}
     looks = [{"marker": marker, "label": word} | _TRIANGLE for marker, word in words.items()]
     looks += [{"marker": "o", "label": "locks"} | _DOT] if locked else []
