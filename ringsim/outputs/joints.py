@@ -280,12 +280,19 @@ def missed(values: Values, planes: Sequence[str]) -> str:
 # The shock of every lock.
 
 
+_AT_REST = 0.01
+"""Share of the rate at a lock below which a V-joint has come to rest in its stop: one that drag
+brakes, or that creeps on, never stops quite."""
+
+
 class LockImpulse(Output):
-    """Angular impulse of the stop on every V-joint while it first holds it: from its lock until the
-    torque ends or turns round.
+    """Angular impulse of the stop on every V-joint in its first contact: from the lock until the
+    joint comes to rest, and as long again, or until the torque ends or turns round before.
 
     A V-joint that meets its stop alone, at the rate w and with the inertia I, takes I w (1 + e), e
-    its coefficient of restitution.
+    its coefficient of restitution: a linear stop with any damping takes as long to throw it back
+    as to halt it.  What presses a latched joint on after that is load, not shock, and grows with
+    the time for which one looks.
     """
 
     rank = 48
@@ -293,7 +300,8 @@ class LockImpulse(Output):
     variables = (
         Variable(
             "lock_impulse", ("plane", "section"), "N m s",
-            "angular impulse of the stop on the V-joint at its lock; missing if it did not lock",
+            "angular impulse of the stop on the V-joint at its lock: until it has come to rest, "
+            "and as long again for its rebound; missing if it did not lock",
         ),
         Variable(
             "peak_lock_impulse", (), "N m s",
@@ -312,13 +320,16 @@ class LockImpulse(Output):
         found = np.full(run.locks.shape, np.nan)
         for place in np.argwhere(np.isfinite(run.locks)):
             where = tuple(place)
-            found[where] = first_impulse(series.times, series.values[:, *where], run.locks[where])
+            torques, rates = (each.values[:, *where] for each in (series, run.rates))
+            found[where] = first_impulse(series.times, torques, rates, run.locks[where])
         peak = np.fmax.reduce(found, axis=None)  # without a lock NaN
         return {"lock_impulse": found, "peak_lock_impulse": peak}
 
 
-def first_impulse(times: Array, torques: Array, lock: float) -> float:
-    """Impulse (N m s) of the first contact after a lock (s), of torques (N m) at times (s)."""
+def first_impulse(times: Array, torques: Array, rates: Array, lock: float) -> float:
+    """Impulse (N m s) of the first contact after a lock (s), of torques (N m) and opening rates
+    (rad/s) at times (s); see ``LockImpulse``.
+    """
     begun = max(int(np.searchsorted(times, lock)) - 1, 0)
     pushed = np.flatnonzero(torques[begun:]) + begun
     if not len(pushed):
@@ -329,10 +340,25 @@ def first_impulse(times: Array, torques: Array, lock: float) -> float:
     # The contact begins at the lock and ends between two steps.
     held = slice(first, last)
     own = np.concatenate([[min(lock, times[first])], times[held], times[last : last + 1]])
+    torque = np.concatenate([[0.0], torques[held], np.zeros(len(times[last : last + 1]))])
+    end = min(2.0 * _rest(times, rates, begun, lock) - lock, float(own[-1]))
+    inside = own < end
+    torque = np.append(torque[inside], np.interp(end, own, torque))
     from scipy.integrate import trapezoid  # here: only scenes that record reactions need it
 
-    ends = np.zeros(1 + len(times[last : last + 1]))
-    return float(abs(trapezoid(np.concatenate([ends[:1], torques[held], ends[1:]]), own)))
+    return float(abs(trapezoid(torque, np.append(own[inside], end))))
+
+
+def _rest(times: Array, rates: Array, begun: int, lock: float) -> float:
+    """When a V-joint that locks in the step behind ``begun`` comes to rest, s; infinite if not."""
+    enough = _AT_REST * rates[begun]
+    there = np.flatnonzero(rates[begun + 1 :] <= enough) + begun + 1
+    if not len(there):
+        return math.inf
+    k = int(there[0])
+    before = (lock, rates[begun]) if k == begun + 1 else (times[k - 1], rates[k - 1])
+    part = (before[1] - enough) / max(before[1] - rates[k], 1e-300)
+    return float(before[0] + min(part, 1.0) * (times[k] - before[0]))
 
 
 # How well the joints hold together.
