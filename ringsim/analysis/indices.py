@@ -71,23 +71,24 @@ def partial_correlations(x: Array, output: Array) -> Array:
     """Rank correlation of each column with the output, the others held, shape (columns,), from
     centred ranks ``x``, shape (samples, columns).
 
-    NaN if samples are too few or columns depend on each other.  Source: Iman and Conover,
-    Technometrics 21 (1979); from the inverse of the matrix of correlations.
+    NaN if samples are too few or columns depend on each other, and of a column that is the same in
+    all samples, which has no effect to hold.  Source: Iman and Conover, Technometrics 21 (1979);
+    from the inverse of the matrix of correlations.
     """
-    count, wide = x.shape
-    none = np.full(wide, np.nan)
-    if count < wide + 2 + _SPARE or not wide:
-        return none
-    y = centred_ranks(output[:, None])
+    moving = (x != 0.0).any(axis=0)
+    count, wide = len(x), int(moving.sum())
+    found, y = np.full(x.shape[1], np.nan), centred_ranks(output[:, None])
+    if count < wide + 2 + _SPARE or not wide or not y.any():
+        return found
+    x = x[:, moving]
     matrix = np.block([[x.T @ x, x.T @ y], [y.T @ x, y.T @ y]])
     scale = np.sqrt(np.diag(matrix))
-    if (scale == 0).any():
-        return none
     matrix = matrix / scale / scale[:, None]
     if np.linalg.cond(matrix) > 1e10:
-        return none
+        return found
     inverse = np.linalg.inv(matrix)
-    return np.asarray(-inverse[:-1, -1] / np.sqrt(np.diag(inverse)[:-1] * inverse[-1, -1]))
+    found[moving] = -inverse[:-1, -1] / np.sqrt(np.diag(inverse)[:-1] * inverse[-1, -1])
+    return found
 
 
 def areas(columns: Array, group: NDArray[np.bool_]) -> Array:

@@ -43,7 +43,7 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
     within = places_in(analysis)
     rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
-    lonely = False
+    lonely, alike = False, dict[str, list[str]]()
     named = set[str]()
     for output in _correlated(analysis):
         plain, partial = (
@@ -56,7 +56,9 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         certain = certain or bool(np.isfinite(plain[1]).any())
         used = int(analysis[f"{output}_samples"].values[0])
         least = min(least or used, used)
-        chosen = _largest(plain[0], place, names, within)
+        for k in np.flatnonzero(np.isnan(plain[0])).tolist():
+            alike.setdefault(str(names[k]), []).append(output)
+        chosen = [k for k in _largest(plain[0], place, names, within) if np.isfinite(plain[0][k])]
         named |= {str(names[k]) for k in chosen}
         rows += [
             (
@@ -68,12 +70,10 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         some = np.isnan(partial[0][chosen])
         lonely |= bool(some.any() and not some.all())
         if some.all() and len(chosen):
-            alike = [str(names[k]) for k in chosen if np.isnan(plain[0][k])]
             alone = np.nanmax(np.abs(plain[0][chosen])) > _ALONE
             why = "one input determines the ranks" if alone else (
                 "too few samples, or correlated inputs"
             )  # fmt: skip
-            why = f"{alike[0]} is the same in all these samples" if alike else why
             lacking.append(f"{output} ({counted(used, 'sample')} used: {why})")
     if lonely:
         notes.append(
@@ -85,6 +85,10 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
             "no partial correlation (effect of one input with the others removed): "
             f"{', '.join(lacking)}"
         )
+    notes += [
+        f"{name} is the same in all samples used for {', '.join(each)}: no correlation with it"
+        for name, each in alike.items()
+    ]
     if rows:
         chance = (
             f"about {(1 - LEVEL) * len(names):.2g} of their intervals exclude zero"
