@@ -404,7 +404,8 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         count = str(used) if used == run else f"{used} of {run}"
         within = factor * float(analysis[f"{name}_same_within"])
         if all_alike(least, most) or np.isfinite(within):
-            value = "0" if abs(mean) < NOTHING else f"{number_text(mean)} {units}".rstrip()
+            value = mean if np.isfinite(mean) else least  # no mean without a population
+            value = "0" if abs(value) < NOTHING else f"{number_text(value)} {units}".rstrip()
             error = f" (within its error bar of {within:.2g} {units}".rstrip() + ")"
             alike.append(
                 f"{name} {value}{error * (within > 0)}" + f" (in {count})" * int(used < run)
