@@ -232,6 +232,11 @@ class Latching(Output):
             "latched_joints": caught.sum(),
         }
 
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the joint met its latch that was the slowest."""
+        rates = _rates(run)
+        return _at_lock("least_latch_rate", run, -rates) if np.isfinite(rates).all() else {}
+
 
 class FastestLatch(Output):
     """The largest opening rate at which a V-joint met its latch: the shock of latching grows with
@@ -257,6 +262,17 @@ class FastestLatch(Output):
         return {"peak_latch_rate": np.fmax.reduce(rates, axis=None)} | LARGEST.at(
             run, run.locks, rates
         )
+
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the joint met its latch that was the fastest."""
+        return _at_lock("peak_latch_rate", run, _rates(run))
+
+
+def _at_lock(name: str, run: Run, values: Array) -> dict[str, float]:
+    """When the joint locked that has the largest of values, shape (planes, sections)."""
+    if not np.isfinite(values).any():
+        return {}
+    return {name: float(run.locks.flat[int(np.nanargmax(values))])}
 
 
 def _rates(run: Run) -> Array:
@@ -317,13 +333,23 @@ class LockImpulse(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Trapezoids over the steps, which resolve a bounce."""
-        found = np.full(run.locks.shape, np.nan)
-        for place in np.argwhere(np.isfinite(run.locks)):
-            where = tuple(place)
-            torques, rates = (each.values[:, *where] for each in (series, run.rates))
-            found[where] = first_impulse(series.times, torques, rates, run.locks[where])
+        found = _impulses(run, series)
         peak = np.fmax.reduce(found, axis=None)  # without a lock NaN
         return {"lock_impulse": found, "peak_lock_impulse": peak}
+
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the joint locked that took most."""
+        return _at_lock("peak_lock_impulse", run, _impulses(run, series))
+
+
+def _impulses(run: Run, series: Series) -> Array:
+    """Shape (planes, sections), N m s; NaN where a joint did not lock."""
+    found = np.full(run.locks.shape, np.nan)
+    for place in np.argwhere(np.isfinite(run.locks)):
+        where = tuple(place)
+        torques, rates = (each.values[:, *where] for each in (series, run.rates))
+        found[where] = first_impulse(series.times, torques, rates, run.locks[where])
+    return found
 
 
 def first_impulse(times: Array, torques: Array, rates: Array, lock: float) -> float:
