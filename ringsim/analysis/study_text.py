@@ -35,7 +35,16 @@ from ringsim.analysis.reweighting import (
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
-from ringsim.analysis.worst import MARK, NOTE, losses, marked, worst_lines, worst_tables
+from ringsim.analysis.worst import (
+    MARK,
+    NOTE,
+    losses,
+    margin_table,
+    margins,
+    marked,
+    worst_lines,
+    worst_tables,
+)
 from ringsim.refusal import InputError
 from ringsim.tables import (
     Table,
@@ -182,7 +191,7 @@ def sections(
         ),
         Section("matters", "What matters", short, more.get("matters", ())),
         Section("worst", "The worst samples", worst_tables(analysis, folder)),
-        Section("requirements", "Requirements", [verdict_table(analysis)]),
+        Section("requirements", "Requirements", [margin_table(analysis), verdict_table(analysis)]),
         Section("reweighting", "Other distributions", reweighting_tables(analysis)),
     )
     return {
@@ -265,6 +274,8 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
     lines = [*filter(None, [lost.note])]
     lines += [line + lost.mark for line in stopping_lines(campaign, placed)]
     lines += tail_table(found).lines()
+    known = margins(campaign).assign_attrs({NOTE: lost.note})
+    lines += slim(margin_table(known)).lines() if known.data_vars else []
     try:
         found = judge(population_of(campaign), required_by(campaign.attrs), placed)
     except InputError as error:

@@ -134,7 +134,16 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
         )  # fmt: skip
         for number, line in enumerate(lines):
             click.echo(f"{'' if number else label:<{wide}}{line.replace(_TIED, ' = ')}")
-    click.echo("valid: ringsim run FILE runs it")
+    lacking = _lacking(loaded)
+    click.echo(f"valid{lacking}: ringsim run FILE runs it")
+
+
+def _lacking(scene: Scene) -> str:
+    """What a scene that asks for a drive margin falls short of, in words; empty if of nothing."""
+    if scene.margin is None:
+        return ""
+    least = DriveMargin(substituted(scene), scene.margin).least()
+    return f", but {_verdict(least)} (--margin tells why)" if least.margin < 0.0 else ""
 
 
 def _summary(scene: Scene) -> dict[str, str]:

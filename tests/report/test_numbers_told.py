@@ -394,8 +394,18 @@ def failing(file: File) -> int:
     )
 
 
+def limits(file: File, rows: list[dict[str, str]]) -> None:
+    """The scene has no limit of a load, but a drive margin."""
+    (row,) = rows
+    sample = file.worst("least_drive_margin")[0]
+    least = file.values["least_drive_margin"][sample]
+    assert (row["limit"], row["in sample"]) == ("least_drive_margin >= 0", str(sample))
+    agrees(row["margin"].partition(":")[0], least, digits=3)
+    assert row["margin"].endswith(": NOT enough") == (least < 0.0)
+
+
 CHECKS = {
-    "outcome": outcomes, "output": outputs, "error of the mean of": errors,
+    "limit": limits, "outcome": outcomes, "output": outputs, "error of the mean of": errors,
     "what matters for": matters, "what separates": separates,
     "error of the solution": lambda file, rows: balance(file, rows),
 }  # fmt: skip
@@ -447,7 +457,7 @@ def test_the_report_says_what_the_file_holds(told: tuple[File, list[str], str, l
                 assert row["run it again"].endswith(f" {sample}")
                 assert row["player"] in (f"show {sample}", "-")
                 seen.append(sample)
-        elif name == "requirements-table":
+        elif page.found[name][1][0][0] == "requirement":
             verdicts(file, page.rows(name), texts)
         elif name.startswith("every-matters-table"):
             measures(file, page.rows(name))
