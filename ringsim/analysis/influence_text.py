@@ -201,8 +201,16 @@ HEADS = {
 }  # fmt: skip
 
 
-def _ends(interval: Array) -> str:
-    return interval_text(float(interval[0]), float(interval[1]), 2)
+FEW_DECIDE = "few samples decide it"
+"""Instead of an interval that is longer than all that is possible, or leaves it."""
+
+
+def _ends(interval: Array, measure: str = "") -> str:
+    """An interval; of a share of a variance none that is longer than the whole of it."""
+    low, high = interval.tolist()
+    return FEW_DECIDE if measure.endswith("_index") and high - low > 1.0 else interval_text(
+        low, high, 2
+    )  # fmt: skip
 
 
 def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
@@ -235,7 +243,7 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
             for name in names:
                 row.append(number_text(one[name].values[k], 2))
                 if f"{name}_interval" in one:
-                    row.append(_ends(one[f"{name}_interval"].values[k]))
+                    row.append(_ends(one[f"{name}_interval"].values[k], name))
             rows.append([*row, str(one["index_used"].item()), str(one["index_lost"].item())])
     notes = measure_notes(analysis)
     notes += confounding_notes(analysis, named) if dim == "input" else []
@@ -353,9 +361,9 @@ def _second(analysis: xr.Dataset) -> Table:
         values = one["second_order_index"].values
         found = [(j, k) for j in range(len(factors)) for k in range(j) if np.isfinite(values[j, k])]
         for j, k in sorted(found, key=lambda pair: -values[pair])[:_MOST_PLACES]:
-            ends = one["second_order_index_interval"].values[j, k]
+            ends = _ends(one["second_order_index_interval"].values[j, k], "second_order_index")
             rows.append((f"{output} by {factors[k]} with {factors[j]}",
-                         number_text(values[j, k], 2), _ends(ends)))  # fmt: skip
+                         number_text(values[j, k], 2), ends))  # fmt: skip
     head = ("what explains", "second-order index", "95 % interval")
     return marked(Table(head, rows), analysis)
 
@@ -478,7 +486,8 @@ def _row_of(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ...]:
         names = one[dim].values.tolist()
         if name in names:  # of blocks whose outputs have no index these are groups, not inputs
             k = names.index(name)
-            cells = number_text(one[measure].values[k], 2), _ends(_index_ends(one, measure)[k])
+            ends = _ends(_index_ends(one, measure)[k], measure)
+            cells = number_text(one[measure].values[k], 2), ends
     return name, *cells, *_correlations(analysis, output, name)
 
 

@@ -9,6 +9,7 @@ import xarray as xr
 
 from ringsim.analysis.design import FAILED_RUNS, law_text, placement, population_of
 from ringsim.analysis.influence_text import (
+    FEW_DECIDE,
     influence_tables,
     refusals,
     sensitivity_tables,
@@ -18,9 +19,11 @@ from ringsim.analysis.influence_text import (
 from ringsim.analysis.intervals import (
     LEAST_OF_BOOTSTRAP,
     NOTHING,
+    ONE_DECIDES,
     all_alike,
     is_moment,
     numbers,
+    of_one,
     quantities,
     ranks,
 )
@@ -86,13 +89,14 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
             few = decisive < (LEAST_OF_MEAN if statistic == "mean" else LEAST_OF_SHARE)
             thin |= few
             factor, unit = unit_of(analysis, name)
+            lowest = analysis[name].sel(statistic="minimum").item()
             drawn, reweighted, low, high = factor * np.array([
                 one[name], one[f"{name}_reweighted"], *one[f"{name}_reweighted_interval"]
             ])  # fmt: skip
             rows.append((
                 f"{name}{THIN * few}{bent}", unit, statistic.replace("_", " "),
                 number_text(drawn), estimate_text(reweighted, low, high),
-                interval_text(low, high),
+                FEW_DECIDE if low < 0.0 <= lowest else interval_text(low, high),
                 number_text(one[f"{name}_effective_samples"].item(), 3), number_text(decisive, 3),
             ))  # fmt: skip
     for event in analysis["event"].values:
@@ -478,6 +482,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
         factor, units = unit_of(analysis, name)
         values = factor * analysis[name].values
         least, most = values[-2:]
+        far = max(most - values[0], values[0] - least)
         fine = digits_of(least, most)
         for k, statistic in enumerate(STATISTICS):
             value = values[k]
@@ -488,6 +493,9 @@ def every_statistic(analysis: xr.Dataset) -> Table:
             digits = 4 if statistic == "standard_deviation" else fine
             first = factor * analysis.variables[f"{name}_convergence"].values[:-1, k]
             low, high = (factor * analysis.variables[f"{name}_interval"].values[k]).tolist()
+            alone = ""
+            if statistic == "standard_deviation" and of_one(value, far, int(used)):
+                alone, low, high = ONE_DECIDES, np.nan, np.nan
             side, who = k - len(STATISTICS) + 2, ("-", "-")
             if side >= 0 and not same:
                 bar = factor * analysis[f"{name}_end_error"].values[side]
@@ -496,7 +504,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
                 name, units,
                 "all" if same else statistic.replace("_", " "),
                 estimate_text(value, low, high, digits),
-                interval_text(low, high, digits), *who,
+                alone or interval_text(low, high, digits), *who,
                 *(number_text(v, digits) for v in first), used, lost, absent,
             ))  # fmt: skip
     head = (

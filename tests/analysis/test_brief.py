@@ -170,3 +170,42 @@ def test_outputs_without_an_index_in_blocks_are_told_by_inputs_and_not_by_groups
     found["first_order_index_interval"] = found["total_index_interval"]
     row = what_matters(found).rows[0]
     assert row[:3] == ("asynchrony_max", "x1", "-")
+
+
+def test_an_interval_that_one_sample_decides_is_none():
+    """39 values between 0 and 1, and one of 50 that alone has another x1: its square is nearly all
+    of the scatter, and the index is that of one sample, with an interval longer than 1."""
+
+    def output(x):
+        return np.where(np.arange(40) == 0, 50.0, x[:, 1])
+
+    made = drawn_campaign(RandomDesign(samples=40), output, 3, 5)
+    made["x1"] = made["x1"].copy(data=1.0 * (np.arange(40) == 0))
+    lines = told(analyse(made, {}, {"x2": {"kind": "uniform", "low": 0.0, "high": 0.7}}), full=True)
+    (row,) = (line for line in lines if "standard deviation" in line and "asynch" in line)
+    assert "one sample decides it" in row
+    (row,) = (line for line in lines if line.startswith("asynchrony_max by x1"))
+    assert "few samples decide it" in row
+    usual = told(
+        analyse(drawn_campaign(RandomDesign(samples=60), lambda x: x[:, 1], 3, 5)), full=True
+    )
+    assert not any("decide it" in line or "decides it" in line for line in usual)
+
+
+def test_a_mean_that_cannot_be_negative_has_no_interval_that_is():
+    """Reweighted to where the one large value lies."""
+
+    def output(x):
+        return np.where(np.arange(60) == 7, 40.0, x[:, 1] ** 2)
+
+    made = drawn_campaign(RandomDesign(samples=60), output, 2, 3)
+    low = 0.5 * np.floor(2.0 * float(made["x2"][7]))
+    law = {"x2": {"kind": "uniform", "low": low, "high": low + 0.5}}
+    found = analyse(made, {}, law)
+    ends = found["asynchrony_max_reweighted_interval"].sel(reweighted_statistic="mean").values
+    assert ends[0] < 0.0 < ends[1]
+    (row,) = (
+        line for line in told(found, full=True)
+        if line.startswith("asynchrony_max (few)") and "  mean  " in line
+    )  # fmt: skip
+    assert "few samples decide it" in row
