@@ -7,12 +7,13 @@ import xarray as xr
 
 from ringsim.analysis.indices import largest_by_chance
 from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
-from ringsim.analysis.study_text import Section, digits_of
+from ringsim.analysis.study_text import Section
 from ringsim.analysis.verdicts import Verdict
 from ringsim.analysis.worst import NOTE, marked
 from ringsim.tables import (
     Table,
     counted,
+    digits_of,
     estimate_text,
     interval_text,
     number_text,
@@ -231,7 +232,7 @@ def _outputs(found: xr.Dataset) -> Table:
     head = (
         "output" if found.attrs["runs"] else "mean of", "unit", *names_of(found),
         "difference", "in %", "95 % interval", "worse in",
-        "samples", "largest of a pair", "in sample", "rank correlation of pairs",
+        "samples", "largest difference of a pair", "in sample", "rank correlation of pairs",
     )  # fmt: skip
     columns = 8 if found.attrs["runs"] else len(head)
     same = "the same in both" if found.attrs["runs"] else "the same in each pair"

@@ -17,7 +17,7 @@ from ringsim.analysis.influence import (
     separating,
     standing_out,
 )
-from ringsim.analysis.intervals import LEVEL, is_moment, quantities
+from ringsim.analysis.intervals import ALIKE, LEVEL, hardly_apart, is_moment, quantities
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, chance_text, counted, interval_text, number_text
@@ -386,9 +386,9 @@ def what_matters(analysis: xr.Dataset) -> Table:
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
     rows, quiet, doubtful, more = [], [], list[str](), list[str]()
-    separated = _separated_groups(analysis)
+    separated, flat = _separated_groups(analysis), _flat(analysis)
     for output, names, others in mattering(analysis):
-        if is_moment(output):
+        if is_moment(output) or output in flat:
             continue
         doubtful += [f"{output} by {name}" for name in others[:_MOST_IN_SHORT]]
         if len(names) > _MOST_IN_SHORT:
@@ -417,11 +417,27 @@ def what_matters(analysis: xr.Dataset) -> Table:
             "not listed, because a correlated input with a larger index explains it (its partial "
             f"rank correlation is not significant): {', '.join(doubtful)}"
         )
+    if flat:
+        notes.append(
+            f"not listed, because samples differ by less than {100 * ALIKE:g} %: {', '.join(flat)}"
+        )
     if quiet:
         notes.append(f"no significant input for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *RANKS.values())
     return marked(Table(head, rows, notes, left=2), analysis, 1)
+
+
+def _flat(analysis: xr.Dataset) -> list[str]:
+    """The outputs of which no digit that tables give changes between samples, unless none does or a
+    requirement asks for them: what explains them is no news.
+    """
+    wanted = analysis["requirement"].values.tolist() if "requirement" in analysis.dims else []
+    known = [name for name in quantities() if name in analysis and not is_moment(name)]
+    known = [name for name in known if name in _correlated(analysis)]
+    ends = {name: analysis[name].sel(statistic=["minimum", "maximum"]).values for name in known}
+    flat = [name for name in known if name not in wanted and hardly_apart(*ends[name].tolist())]
+    return flat if len(flat) < len(known) else []
 
 
 def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]]:

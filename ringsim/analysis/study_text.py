@@ -52,7 +52,9 @@ from ringsim.refusal import InputError
 from ringsim.tables import (
     Table,
     counted,
+    digits_of,
     estimate_text,
+    fine_text,
     interval_text,
     number_text,
     readable,
@@ -142,9 +144,9 @@ def _verdicts(analysis: xr.Dataset) -> Table:
             number_text(one["reweighted_probability"].item()),
             _decisive(Verdict(one["reweighted_verdict"].item()), *one["reweighted_bounds"].values),
         ))  # fmt: skip
-    head = ("requirement, reweighted", "probability", "confidence", "verdict", "estimate",
+    head = ("requirement, reweighted", "probability", "confidence", "verdict", _MET,
             _BOUND)  # fmt: skip
-    return marked(Table(head, rows), analysis, head.index("estimate"))
+    return marked(Table(head, rows), analysis, head.index(_MET))
 
 
 # An analysis of a campaign as lines for people.
@@ -305,6 +307,7 @@ def not_met(analysis: xr.Dataset) -> list[str]:
 def verdict_table(analysis: xr.Dataset) -> Table:
     """The verdicts, a row a requirement; no rows without requirements."""
     rows, notes, chosen = [], list[str](), False
+    never = dict[tuple[str, str], list[str]]()
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         variables = analysis.sel(requirement=name).variables
         one = {str(n): v.values.item() for n, v in variables.items() if not v.dims}
@@ -335,6 +338,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
                 f"{name}: violated with a probability of {share} ({low} .. {high}, each bound with "
                 "the confidence required)"
             )
+        elif not bad and used and np.isfinite(one["probability_lower"]):
+            most = number_text(1.0 - one["probability_lower"], 2)
+            never.setdefault((most, f"{one['confidence_required']:g}"), []).append(str(name))
         if verdict != alone:
             notes.append(
                 f"{name}: without the failed runs it would be {alone.words}; run them again "
@@ -353,16 +359,22 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             notes.append(
                 f"{name}: violations without a value (the antenna did not get that far): {missing}"
             )
+    notes = [
+        f"no sample violates {', '.join(names)}: the probability of a violation is at most {most} "
+        f"(confidence {level})"
+        for (most, level), names in never.items()
+    ] + notes
     if rows:
         notes.insert(0, _CHOSEN if chosen else _DECIDES)
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
-        "verdict", "estimate", _BOUND, "samples used", "violating", "failed runs",
+        "verdict", _MET, _BOUND, "samples used", "violating", "failed runs",
         "verdict without failed runs", "samples to go",
     )  # fmt: skip
-    return marked(Table(head, rows, notes), analysis, head.index("estimate"))
+    return marked(Table(head, rows, notes), analysis, head.index(_MET))
 
 
+_MET = "share that meets it"
 _BOUND = "one-sided bound"
 _DECIDES = (
     "the one-sided bound, at the confidence required, decides each verdict; where neither the "
@@ -401,7 +413,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
 
 
 def _parts() -> list[str]:
-    return [f"in first {part:.0%}" for part in PARTS[:-1]]
+    return [f"of the first {100 * part:.0f} %" for part in PARTS[:-1]]
 
 
 def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
@@ -430,15 +442,15 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
             low, high = (factor * analysis[f"{name}_interval"].values[0]).tolist()
             scatters = np.isfinite(analysis[f"{name}_error_of_mean"].values[0])
             few |= bool(scatters and np.isnan(low) and used < LEAST_OF_BOOTSTRAP)
-            others = [number_text(v, fine) for v in (*quantiles, least, most)]
+            others = [fine_text(v, fine) for v in (*quantiles, least, most)]
             worst = int(analysis[f"{name}_worst_sample"])
             rows.append((
                 name, units, estimate_text(mean, low, high, fine), interval_text(low, high, fine),
                 number_text(deviation), *others, "-" if worst < 0 else str(worst), count,
             ))  # fmt: skip
     head = (
-        "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
-        "most", "worst sample", "samples used",
+        "output", "unit", "mean", "95 % interval of it", "std. dev.", "5 %", "median", "95 %",
+        "least", "most", "worst sample", "samples used",
     )  # fmt: skip
     notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
@@ -462,16 +474,6 @@ def unit_of(analysis: xr.Dataset, name: str) -> tuple[float, str]:
         np.nanmax(np.abs(analysis.variables[name].values), initial=0.0),
     )
     return factor, unit_text(units)
-
-
-def digits_of(least: float, most: float) -> int:
-    """Four, or so many that a narrow range has two of its own.
-
-    >>> digits_of(22.19, 33.5), digits_of(4.99623, 4.99725)
-    (4, 5)
-    """
-    larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
-    return max(4, int(np.log10(larger)) + 2)
 
 
 def every_statistic(analysis: xr.Dataset) -> Table:
@@ -540,10 +542,13 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         factor, units = unit_of(analysis, name)
         errors, largest = factor * errors, factor * largest
         cells = [number_text(errors[0], 2)]
+        nothing = max(_NO_ERROR * max(abs(least), abs(most)), NOTHING) * factor
         for error, count, most_of_all, sample in list(
             zip(errors, counts, largest, samples, strict=True)
         )[1:]:
-            told = [number_text(error, 2), str(count), f"{most_of_all:.2g} (sample {sample})"]
+            told = ["0" if error < nothing else number_text(error, 2), str(count), "0"]
+            if most_of_all >= nothing:
+                told[2] = f"{most_of_all:.2g} (sample {sample})"
             cells += told if count else ["-"] * 3
         rows.append((name, units, *cells, dominating(errors)))
     head = (
@@ -567,6 +572,10 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
     if (remarks := analysis.attrs.get("remarks")) and not wanted:
         tables.append(Table((), (), remarks.split("\n")))
     return tables
+
+
+_NO_ERROR = 1e-7
+"""Error over the value below which it is told as 0: no output is known to so many digits."""
 
 
 def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:

@@ -209,3 +209,42 @@ def test_a_mean_that_cannot_be_negative_has_no_interval_that_is():
         if line.startswith("asynchrony_max (few)") and "  mean  " in line
     )  # fmt: skip
     assert "few samples decide it" in row
+
+
+def test_what_hardly_differs_is_not_explained_unless_a_requirement_asks_for_it():
+    """Of 40 N by 0.01 N, all of it x1's: no digit of it that tables give changes."""
+    made = drawn_campaign(RandomDesign(samples=200), linear, 3, 4)
+    made["peak_tension"] = "sample", 40.0 + 0.01 * made["x1"].values, {"units": "N"}
+    told_of = "not listed, because samples differ by less than 0.1 %: peak_tension"
+    table = what_matters(analyse(made))
+    assert [row[0] for row in table.rows if row[0]] == ["asynchrony_max"]
+    assert told_of in table.notes
+    wanted = {"peak_tension": {"max": 41.0, "probability": 0.9, "confidence": 0.9}}
+    assert "peak_tension" in [row[0] for row in what_matters(analyse(made, wanted)).rows]
+    alone = what_matters(analyse(made.drop_vars("asynchrony_max")))  # then it is all there is
+    assert [row[0] for row in alone.rows if row[0]] == ["peak_tension"]
+
+
+def test_a_probability_is_bounded_where_no_sample_violates():
+    """Of 40 samples without a violation 1 - 0.1^(1/40) = 0.056 at 90 %."""
+    made = drawn_campaign(RandomDesign(samples=40), linear, 2, 4)
+    wanted = {"asynchrony_max": {"max": 9.0, "probability": 0.9, "confidence": 0.9}}
+    assert round(1.0 - 0.1 ** (1 / 40), 3) == 0.056
+    assert (
+        "no sample violates asynchrony_max: the probability of a violation is at most 0.056 "
+        "(confidence 0.9)"
+    ) in told(analyse(made, wanted))
+
+
+def test_differences_of_rounding_are_told_as_zero_and_narrow_ranges_with_all_their_digits():
+    made = drawn_campaign(RandomDesign(samples=40), linear, 2, 4)
+    power = np.linspace(2.9994, 3.0, 40)
+    made["peak_motor_power"] = "sample", power, {"units": "W"}
+    checked = np.where(np.arange(40) % 20 == 0, power * (1.0 + 1e-9), np.nan)
+    made["peak_motor_power_checked"] = "sample", checked, {"units": "W"}
+    status = np.where(np.arange(40) % 20 == 0, 0, -1)
+    made["status_checked"] = "sample", status, {}
+    lines = [line for line in told(analyse(made)) if line.startswith("peak_motor_power ")]
+    numbers, errors = lines[0].split(), lines[1].split()
+    assert {"2.9997", "2.9994", "3.0000"} <= set(numbers)
+    assert errors[3:6] == ["0", "2", "0"]
