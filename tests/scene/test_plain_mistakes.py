@@ -329,6 +329,28 @@ def test_a_scene_file_without_its_ending_is_suggested(tmp_path: Path) -> None:
     )
 
 
+def test_a_scene_file_that_is_misspelt_is_suggested_before_a_built_in_scene(tmp_path: Path) -> None:
+    (tmp_path / "ring12.toml").write_text(load_scene("ring18").to_toml())
+    with pytest.raises(InputError, match=r"did you mean \S*/ring12\.toml\?"):
+        load_scene(tmp_path / "ring13.toml")
+    with pytest.raises(InputError, match=r"did you mean ring18\?"):
+        load_scene(Path("rong18"))
+
+
+def test_refusals_of_campaigns_tell_the_cure(tmp_path: Path) -> None:
+    """A normal friction goes below zero; percents are no probabilities."""
+    path = tmp_path / "mine.toml"
+    law = '{ kind = "normal", mean = -0.02, standard_deviation = 0.002 }'
+    path.write_text(f'{CAMPAIGN}"joints.vjoint.coulomb" = {law}\n')
+    line = refused("campaign", path, "--dry-run")
+    assert re.search(r"joints\.vjoint\.coulomb = -0\.\d{1,11} N m must be at least 0 N m: ", line)
+    assert line.endswith('draw it with kind = "truncated", low = 0, of = { kind = "normal", ... }')
+    wanted = "[requirements]\nasynchrony_max = { max = 9.0, probability = 95, confidence = 0.9 }"
+    path.write_text(f"{CAMPAIGN}\n{wanted}\n")
+    line = refused("campaign", path, "--dry-run")
+    assert line.endswith("probability = 95 must be below 1; 95 % are 0.95")
+
+
 @for_each(
     ("values", "text"),
     [
