@@ -175,7 +175,5 @@ def _of_others(sound: xr.Dataset, variable: Variable) -> tuple[float, str]:
     stated = sound[name].dropna("sample")
     largest = float(stated.max())
     most = with_unit(f"{largest:.2g}", variable.units)
-    return largest, (
-        f"; this sample has no error bar, the {counted(stated.size, 'sample')} that have one are "
-        f"within {most}"
-    )
+    others = counted(stated.size, "other sample")
+    return largest, f"; largest error bar of {others}: {most}"

@@ -1,6 +1,7 @@
 """The campaign file: which scene, which inputs, which design, which limits."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -169,6 +170,22 @@ class Specification(Model):
         return Rule(conditions=self.stop_when, looks=self.looks) if self.stop_when else None
 
 
+def _cure(error: str, inputs: Mapping[str, Distribution]) -> str:
+    """What helps against a drawn value that is refused for a bound; empty if that is said, or if
+    its distribution has ends of its own.
+    """
+    bound = re.search(r"must be (at least|above|at most|below) (\S+)", error)
+    path = max((path for path in inputs if f"{path} = " in error), key=len, default="")
+    if bound is None or not path or "truncate" in error:
+        return ""
+    law = inputs[path]
+    ends = np.array(law.quantile(np.array([0.0, 1.0])))
+    if ends.dtype.kind != "f" or np.isfinite(ends).all():
+        return ""
+    side, kind = "low" if bound[1] in ("at least", "above") else "high", show(kind_of(law))
+    return f': draw it with kind = "truncated", {side} = {bound[2]}, of = {{ kind = {kind}, ... }}'
+
+
 @dataclass(frozen=True)
 class Campaign:
     """A campaign file, its text and content, and the scene that its samples vary."""
@@ -189,7 +206,8 @@ class Campaign:
                 folder=self.file.parent, error_bars_every=wanted.error_bars_every,
             )  # fmt: skip
         except InputError as error:
-            raise InputError(f"{self.file.name}: {error}") from None
+            cure = _cure(str(error), wanted.inputs)
+            raise InputError(f"{self.file.name}: {error}{cure}") from None
         for path in [column.path for column in table.columns if column.path]:
             if given := path if path in wanted.set else first_inside(path, wanted.set):
                 raise InputError(

@@ -59,3 +59,13 @@ def test_what_frames_cannot_answer_is_refused() -> None:
     result = CliRunner().invoke(cli, words)
     assert result.exit_code == 2
     assert "rods.kind" in result.output
+
+
+def test_a_limit_of_stress_does_not_keep_from_looking_for_the_angle() -> None:
+    words = ["check", "ring18", "--deploys-in", "9", "--set", "structure.sections=4"]
+    plain, limited = (
+        CliRunner().invoke(cli, [*words, *more])
+        for more in ([], ["--set", "record.stress=true", "--set", "limits.rod_stress=2e8"])
+    )
+    assert limited.exit_code == 0
+    assert limited.output == plain.output
