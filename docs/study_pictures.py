@@ -25,7 +25,7 @@ from ringsim.plots.campaign.frame import LOOKS
 from ringsim.rigid.drive import Drive
 from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.resistances import Opening, resistances
-from ringsim.sampling.subset_levels import Repetition, levels
+from ringsim.sampling.designs.levels import Repetition, levels
 from ringsim.scene import scene_from_toml
 from ringsim.variables import PLANES
 

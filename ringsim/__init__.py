@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ringsim.analysis.comparison import compare
     from ringsim.analysis.study import analyse
+    from ringsim.campaign.calibration import Calibration
     from ringsim.campaign.python import Campaign, CampaignError, open_campaign
     from ringsim.measured import load_measured
     from ringsim.refusal import InputError
@@ -26,18 +27,19 @@ if TYPE_CHECKING:
     from ringsim.stored_state import read_state
 
 __all__ = [
-    "Campaign", "CampaignError", "InputError", "Scene", "analyse", "compare", "load_measured",
-    "load_scene", "open_campaign", "read_state", "simulate",
+    "Calibration", "Campaign", "CampaignError", "InputError", "Scene", "analyse", "compare",
+    "load_measured", "load_scene", "open_campaign", "read_state", "simulate",
 ]  # fmt: skip
 
 _HOMES = {
     "analyse": "analysis.study", "compare": "analysis.comparison",
-    "Campaign": "campaign.python", "CampaignError": "campaign.python",
+    "Calibration": "campaign.calibration", "Campaign": "campaign.python",
+    "CampaignError": "campaign.python",
     "open_campaign": "campaign.python", "InputError": "refusal",
     "load_measured": "measured", "Scene": "scene", "load_scene": "scene", "simulate": "simulation",
     "read_state": "stored_state",
 }  # fmt: skip
-_OF_DATASETS = ("analyse", "compare", "Campaign", "open_campaign", "simulate")
+_OF_DATASETS = ("analyse", "compare", "Calibration", "Campaign", "open_campaign", "simulate")
 """Words that give datasets, or take them."""
 
 

@@ -11,8 +11,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent
 AROUND = (
-    "__main__.py", "accessor.py", "analysis", "calibration.py", "campaign", "cli", "execution",
+    "__main__.py", "accessor.py", "analysis", "campaign", "cli", "execution",
     "export.py", "measured.py", "plots", "reference", "report", "sampling", "storage",
+    "stowed_angle.py",
 )  # fmt: skip
 """What plans and reads results and never makes them: no part of the sources' digest, so that a
 campaign goes on after a figure was mended.  All else counts, also what comes new."""

@@ -57,14 +57,31 @@ _Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 class Clock(Model):
     """What the time of a reading is in the run: offset + (1 + drift) * reading."""
 
-    column: str
+    column: str = ""
     """Its column in the table."""
+    interval: Second | None = None
+    """Before the test: distance of its readings, in place of a table."""
+    end: Second | None = None
+    """Before the test: time of the run of the last of them."""
     unit: str = "s"
     """Of its readings: s, ms or min."""
     offset: Annotated[float, Field(ge=-1e6, le=1e6), Unit("s")] = 0.0
     """Time of the run at which the clock shows zero."""
     drift: Annotated[float, Field(ge=-0.1, le=0.1), Unit("1")] = 0.0
     """By how much the time of the run goes faster than the clock."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        planned = self.interval is not None and self.end is not None
+        if bool(self.column) == planned or (self.interval is None) != (self.end is None):
+            raise ValueError(
+                "give column, a column of the table, or, before there is one, interval and end"
+            )
+        if planned and not 0.0 < (self.interval or 0.0) <= (self.end or 0.0):
+            raise ValueError(
+                f"interval = {self.interval:g} s must be above 0 and at most end = {self.end:g} s"
+            )
+        return self
 
 
 class Sensor(Model):
@@ -84,14 +101,15 @@ class Sensor(Model):
     """Of the scatter of one reading, in ``unit``."""
     bias: _Number = 0.0
     """What it reads too much, in ``unit``: it is taken off."""
+    bias_deviation: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
+    """Standard deviation of what is not known of the bias, one value for all of its readings."""
 
     @model_validator(mode="after")
     def _usable(self) -> Self:
-        if bool(self.column) == (self.value is not None):
-            given = "both" if self.column else "neither"
+        if self.column and self.value is not None:
             raise ValueError(
-                f"column and value: {given} given: a sensor has one of them (a column of the "
-                "table, or the one value that was read)"
+                "column and value: both given: a sensor has one of them (a column of the table, "
+                "or the one value that was read)"
             )
         variable = VARIABLES.get(self.variable)
         if variable is None or variable.dtype == "str":
@@ -103,7 +121,9 @@ class Sensor(Model):
                 f"unit = {show(self.unit)} is none for {self.variable}: choose "
                 f"{' or '.join(map(show, known))}"
             )
-        if ("time" in variable.dims) == (self.value is not None):
+        if (self.column or self.value is not None) and ("time" in variable.dims) == (
+            self.value is not None
+        ):
             want = "column" if "time" in variable.dims else "value"
             raise ValueError(
                 f"variable = {show(self.variable)} "
@@ -139,7 +159,8 @@ class Measured(Model):
     title: Annotated[str, Field(max_length=300)] = ""
     """One line for figures."""
     file: str = ""
-    """The table of readings, beside this file: CSV with a row of heads."""
+    """The table of readings, beside this file: CSV with a row of heads, or netCDF with a variable a
+    column, along one dimension."""
     clock: Clock | None = None
     """Of the table."""
     sensors: Annotated[tuple[Sensor, ...], ListIn, Field(min_length=1, max_length=1000)]
@@ -150,7 +171,18 @@ class Measured(Model):
     @model_validator(mode="after")
     def _whole(self) -> Self:
         columns = [sensor.column for sensor in self.sensors if sensor.column]
-        if columns and not (self.file and self.clock):
+        if self.planned:
+            if self.file:
+                raise ValueError(
+                    "file: readings are planned by clock.interval and clock.end: leave it out, or "
+                    "give clock.column in their place"
+                )
+        elif empty := [s.name for s in self.sensors if not s.column and s.value is None]:
+            raise ValueError(
+                f"sensors: {empty[0]} has neither column nor value: give one of them (a column of "
+                "the table, or the one value that was read)"
+            )
+        if columns and not self.planned and not (self.file and self.clock):
             raise ValueError(
                 f"sensors: column = {show(columns[0])} needs the table and its clock: add file = "
                 '"NAME.csv" and [clock] with column = "..."'
@@ -159,6 +191,11 @@ class Measured(Model):
         if twice := next((name for name in names if names.count(name) > 1), ""):
             raise ValueError(f"sensors: two of them measure {twice}: leave one out")
         return self
+
+    @property
+    def planned(self) -> bool:
+        """Whether the test is still to come: there are times of readings, and no readings."""
+        return self.clock is not None and not self.clock.column
 
 
 @dataclass(frozen=True)
@@ -177,6 +214,11 @@ class Readings:
     gaps: int
     """Times between readings that are longer than usual."""
 
+    @property
+    def bias_deviation(self) -> float:
+        """Standard deviation of what all readings have in common."""
+        return self.sensor.scale * self.sensor.bias_deviation
+
 
 @dataclass(frozen=True)
 class Measurement:
@@ -186,8 +228,9 @@ class Measurement:
     readings: tuple[Readings, ...]
 
 
-def load_measured(path: str | Path) -> Measurement:
-    """The measured data that a TOML file describes.
+def load_measured(path: str | Path, *, planned: bool = False) -> Measurement:
+    """The measured data that a TOML file describes; NaN for readings of a test still to come, which
+    is refused unless ``planned``.
 
     Raises
     ------
@@ -199,9 +242,24 @@ def load_measured(path: str | Path) -> Measurement:
         file = Measured.model_validate(parse_toml(read_text(path), path.name))
     except ValidationError as error:
         raise InputError(explain(error, Measured, path.name)) from None
+    if file.planned and not planned:
+        raise InputError(
+            f"{path.name}: clock.interval: this test is still to come (ringsim sensors): give its "
+            "table as file, and clock.column"
+        )
+    if file.planned:
+        return Measurement(file, tuple(_planned(file, sensor) for sensor in file.sensors))
     asks = any(sensor.column for sensor in file.sensors)
     columns = _table(file, path.parent / file.file) if asks else {}
     return Measurement(file, tuple(_read(file, sensor, columns) for sensor in file.sensors))
+
+
+def _planned(file: Measured, sensor: Sensor) -> Readings:
+    deviation, times = sensor.scale * sensor.standard_deviation, np.full(1, np.nan)
+    if "time" in VARIABLES[sensor.variable].dims and file.clock is not None:
+        step, end = file.clock.interval or 1.0, file.clock.end or 1.0
+        times = step * np.arange(1, int(end / step + 1e-9) + 1)  # 1e-9: a quotient of round numbers
+    return Readings(sensor, times, np.full(len(times), np.nan), deviation, 0, 0)
 
 
 def _read(file: Measured, sensor: Sensor, columns: dict[str, Array]) -> Readings:
@@ -230,6 +288,55 @@ def _table(file: Measured, path: Path) -> dict[str, Array]:
     if file.clock.unit not in _UNITS["s"]:
         known = " or ".join(map(show, _UNITS["s"]))
         raise InputError(f"clock.unit = {show(file.clock.unit)} is no unit of time: choose {known}")
+    wanted = dict.fromkeys([file.clock.column, *(s.column for s in file.sensors if s.column)])
+    found = (_from_netcdf if path.suffix == ".nc" else _from_csv)(path, list(wanted))
+    times = found[file.clock.column]
+    if not np.isfinite(times).all():
+        place = int(np.argmin(np.isfinite(times))) + 1
+        raise InputError(f"{path.name}: row {place}: has no time: give it one, or leave it out")
+    if (back := np.flatnonzero(np.diff(times) <= 0.0)).size:
+        place, unit = int(back[0]) + 2, file.clock.unit
+        raise InputError(
+            f"{path.name}: row {place}: its time {times[place - 1]:g} {unit} is not after "
+            f"{times[place - 2]:g} {unit} of the row before: the clock stands or jumps: correct "
+            "the column, or cut the table there"
+        )
+    return found
+
+
+def _from_netcdf(path: Path, wanted: list[str]) -> dict[str, Array]:
+    """The variables of these names, each along the same one dimension; values that are masked, or
+    not numbers, are empty cells.
+    """
+    import netCDF4
+
+    found = dict[str, Array]()
+    try:
+        with netCDF4.Dataset(path) as data:
+            for name in wanted:
+                if name not in data.variables:
+                    hint = known_or_nearest(name, data.variables)
+                    raise InputError(f"{path.name}: variable {show(name)} is not in it ({hint})")
+                variable = data[name]
+                if len(variable.dimensions) != 1 or variable.dtype.kind not in "iuf":
+                    raise InputError(
+                        f"{path.name}: variable {show(name)} must be numbers along one dimension, "
+                        f"and is {variable.dtype} along {', '.join(variable.dimensions) or 'none'}"
+                    )
+                values = np.ma.filled(variable[:].astype(float), np.nan)
+                if found and len(values) != len(next(iter(found.values()))):
+                    raise InputError(
+                        f"{path.name}: variable {show(name)} has {len(values)} values, and "
+                        f"{show(wanted[0])} has {len(found[wanted[0]])}: give both one dimension"
+                    )
+                found[name] = values
+    except OSError as error:
+        raise InputError(f"{path.name}: cannot be read: {error}") from None
+    return found
+
+
+def _from_csv(path: Path, wanted: list[str]) -> dict[str, Array]:
+    """The columns of these heads."""
     text = read_text(path)
     lines = [row for row in text.splitlines() if row.strip() and not row.startswith("#")]
     if len(lines) < 2:
@@ -240,7 +347,6 @@ def _table(file: Measured, path: Path) -> dict[str, Array]:
     except csv.Error as error:
         raise InputError(f"{path.name}: is no table: {error}: write it as plain CSV") from None
     head = [cell.strip() for cell in head]
-    wanted = dict.fromkeys([file.clock.column, *(s.column for s in file.sensors if s.column)])
     for name in wanted:
         if head.count(name) != 1:
             hint = "two columns are called so" if name in head else known_or_nearest(name, head)
@@ -254,17 +360,6 @@ def _table(file: Measured, path: Path) -> dict[str, Array]:
             )
         for name, column in found.items():
             column[number - 1] = _number(row[head.index(name)], f"{path.name}: row {number}", name)
-    times = found[file.clock.column]
-    if not np.isfinite(times).all():
-        place = int(np.argmin(np.isfinite(times))) + 1
-        raise InputError(f"{path.name}: row {place}: has no time: give it one, or leave it out")
-    if (back := np.flatnonzero(np.diff(times) <= 0.0)).size:
-        place, unit = int(back[0]) + 2, file.clock.unit
-        raise InputError(
-            f"{path.name}: row {place}: its time {times[place - 1]:g} {unit} is not after "
-            f"{times[place - 2]:g} {unit} of the row before: the clock stands or jumps: correct "
-            "the column, or cut the table there"
-        )
     return found
 
 

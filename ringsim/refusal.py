@@ -31,6 +31,8 @@ _MOST_KNOWN = 30
 """Names that a hint lists: more than a table of a scene or campaign has keys."""
 DEEPEST = 100
 """Levels of lists and tables: what a scene or a campaign holds has ten."""
+_DRAWN = 12
+"""Characters of a number above which nobody has written it."""
 LONGEST_VALUE = 60
 """Characters of a refused value that are shown."""
 
@@ -110,6 +112,13 @@ def show(value: Any) -> str:
     return shorten(_toml(value))
 
 
+def _few_digits(value: Any) -> Any:
+    """A value; of a number that was drawn or computed no more digits than people compare."""
+    if isinstance(value, float) and len(str(value)) > _DRAWN:
+        return float(f"{value:.8g}")
+    return value
+
+
 def shorten(text: str) -> str:
     """A text on one line, and cut where it is longer than a reader wants of a refused value."""
     text = " ".join(text.split())
@@ -129,7 +138,7 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     kind, value, limits = fault["type"], fault["input"], fault.get("ctx", {})
     unit = f" {unit_of(field)}".removesuffix(" 1") if field is not None else ""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    shown = f"{where} = {show(value)}{unit if number else ''}"
+    shown = f"{where} = {show(_few_digits(value))}{unit if number else ''}"
     tables = [] if field is None else models_in(field.annotation)
     kinds = _kinds(field)
     match kind:
@@ -174,6 +183,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     line = says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
     if unit == " K" and number and -272.15 <= value <= 0.0:
         return f"{line}; {value:g} C are {value + 273.15:g} K"
+    if number and 1.0 < value <= 100.0 and limits.get("lt", limits.get("le")) == 1.0:
+        return f"{line}; {value:g} % are {value / 100.0:g}"
     if not isinstance(value, str):
         return line
     if meant := _meant(value, kind):

@@ -100,6 +100,27 @@ def number_text(value: float, digits: int = 4) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
+def digits_of(least: float, most: float) -> int:
+    """Four, or so many that a narrow range has two of its own.
+
+    >>> digits_of(22.19, 33.5), digits_of(4.99623, 4.99725)
+    (4, 5)
+    """
+    larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
+    return max(4, int(math.log10(larger)) + 2)
+
+
+def fine_text(value: float, digits: int) -> str:
+    """A number with so many digits; of a narrow range with their zeros, so that all have as many.
+
+    >>> fine_text(2.99996, 5), fine_text(3.0, 4)
+    ('3.0000', '3')
+    """
+    if digits > 4 and math.isfinite(value):
+        return f"{value:#.{digits}g}"
+    return number_text(value, digits)
+
+
 def interval_text(low: float, high: float, digits: int = 4) -> str:
     """Both ends of an interval without digits beyond its half, equally many, or a dash.
 

@@ -9,7 +9,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.design import LOST, NOT_RUN, REACHED, UNKNOWN, endings_of, kinds_of_ends
+from ringsim.analysis.design import (
+    LOST,
+    NOT_RUN,
+    REACHED,
+    UNKNOWN,
+    endings_of,
+    kinds_of_ends,
+    learnt_lines,
+)
 from ringsim.analysis.intervals import good, used, worst_sample
 from ringsim.analysis.worst import losses
 from ringsim.outputs import OUTPUTS
@@ -24,8 +32,10 @@ _LONGEST = 200
 
 
 def notes(campaign: xr.Dataset) -> list[str]:
-    """What became of the antenna, the largest values, runs that were repeated, and remarks."""
-    parts = (outcome_lines, peak_lines, override_lines, restart_lines, remark_lines)
+    """What the inputs rest on, what became of the antenna, the largest values, runs that were
+    repeated, and remarks.
+    """
+    parts = (learnt_lines, outcome_lines, peak_lines, override_lines, restart_lines, remark_lines)
     return [line for part in parts for line in part(campaign)]
 
 
@@ -165,7 +175,5 @@ def _of_others(sound: xr.Dataset, variable: Variable) -> tuple[float, str]:
     stated = sound[name].dropna("sample")
     largest = float(stated.max())
     most = with_unit(f"{largest:.2g}", variable.units)
-    return largest, (
-        f"; this sample has no error bar, the {counted(stated.size, 'sample')} that have one are "
-        f"within {most}"
-    )
+    others = counted(stated.size, "other sample")
+    return largest, f"; largest error bar of {others}: {most}"

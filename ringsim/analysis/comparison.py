@@ -22,12 +22,14 @@ from ringsim.analysis.design import (
     placement,
     population_of,
 )
+from ringsim.analysis.indices import centred_ranks, correlations
 from ringsim.analysis.intervals import (
     NONE,
     Mask,
     difference_of_pairs,
     difference_of_shares,
     good,
+    hardly_apart,
     lost,
     numbers,
     quantities,
@@ -39,16 +41,19 @@ from ringsim.analysis.requirements import (
     violations,
 )
 from ringsim.analysis.tails import subset_simulation
+from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.analysis.worst import NOTE, losses
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
-from ringsim.variables import about
+from ringsim.variables import about, flags_of
 
 Both = tuple[xr.Dataset, xr.Dataset]
 Placements = tuple[Placement, Placement]
 Indices = NDArray[np.int64]
 Places = tuple[Indices, Indices]
 """Places of the samples of both that are pairs, shape (pairs,) each; empty without pairs."""
+_LEAST_PAIRS = 8
+"""Pairs below which no rank correlation is told."""
 _FEW = 10
 """Samples of a kind, or pairs that differ, below which Student's t does not fit."""
 
@@ -64,7 +69,8 @@ def differences_of_shares(both: Both, placed: Placements, pairs: Places) -> dict
     """Variables on outcomes along ``kind`` and on requirements of both along ``requirement``.
 
     For either, with ``kind_`` or ``kept_``: ``samples`` (side), ``share`` (side) of those compared,
-    ``compared`` (side), ``share_difference``, second minus first, and its ``_interval`` (bound).
+    ``compared`` (side), ``share_difference``, second minus first, and its ``_interval`` (bound);
+    and ``kept_verdict`` (side), what the samples of each say.
     """
     words = (endings(both[0]), endings(both[1]))
     held = good(both[0]), good(both[1])
@@ -73,12 +79,18 @@ def differences_of_shares(both: Both, placed: Placements, pairs: Places) -> dict
         kind: Event((words[0] == kind, words[1] == kind), ran if kind.startswith(LOST) else held)
         for kind in sorted({*words[0].tolist(), *words[1].tolist()})
     }
-    found = {"kind": ("kind", np.array([*kinds], dtype=object), {"long_name": "how it ended"})}
+    found: dict[str, Any] = {
+        "kind": ("kind", np.array([*kinds], dtype=object), {"long_name": "how it ended"})
+    }
     found |= _told("kind", "kind", kinds, placed, both, pairs)
     if kept := _kept(both, held):
         texts = np.array([*kept], dtype=object)
         found["requirement"] = "requirement", texts, {"long_name": "requirement of both"}
         found |= _told("kept", "requirement", kept, placed, both, pairs)
+        found["kept_verdict"] = (
+            ("requirement", "side"), _verdicts(both, placed, [*kept]),
+            about("verdict on the requirement") | flags_of(Verdict),
+        )  # fmt: skip
     return found
 
 
@@ -106,6 +118,18 @@ def _kept(both: Both, held: tuple[Mask, Mask]) -> dict[str, Event]:
         first, second = (good(each) & ~violations(each, name, wanted) for each in both)
         found[wanted.told(name)] = Event((first, second), held)
     return found
+
+
+def _verdicts(both: Both, placed: Placements, texts: list[str]) -> NDArray[np.int8]:
+    """What the samples of each campaign say of requirements in words, shape (requirement, side)."""
+    columns = []
+    for campaign, its in zip(both, placed, strict=True):
+        wanted = {name: each for name, each in required_by(campaign.attrs).items()
+                  if each.told(name) in texts}  # fmt: skip
+        judged = judge(campaign, wanted, its)
+        known = dict(zip(judged["requirement_text"].values, judged["verdict"].values, strict=True))
+        columns.append([known[text] for text in texts])
+    return np.array(columns, dtype=np.int8).T
 
 
 def _told(
@@ -193,7 +217,10 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
 
     Returns for every output NAME that both have ``NAME_mean`` (side), ``NAME_difference``,
     ``NAME_difference_interval`` (bound), ``NAME_samples`` (side) in its unit, and for pairs
-    ``NAME_largest_difference`` with ``NAME_largest_difference_sample``; the pairs whose outcome
+    ``NAME_largest_difference`` with ``NAME_largest_difference_sample`` and
+    ``NAME_rank_correlation`` of both (NaN of few pairs, and where either side hardly differs
+    between samples); an output that only one of them has is missing in the other, and in the
+    difference.  The pairs whose outcome
     differs along ``change``; shares of outcomes along ``kind`` and of samples that meet a
     requirement along ``requirement``, see ``differences_of_shares``; the scenes' values that differ
     along ``setting``, by path.  Samples are those that ``analyse`` counts; means and shares are
@@ -358,7 +385,7 @@ def _output(
     """All variables about one output; none if it has no value to compare."""
     values = [np.where(good(each), numbers(each, name), np.nan) for each in both]
     index = [each["sample"].to_numpy() for each in both]
-    largest, where = np.nan, -1
+    largest, where, together = np.nan, -1, np.nan
     ends: tuple[Any, Any] = NONE
     certain = all(each.has_intervals for each in placed)
     if len(pairs.first):
@@ -369,6 +396,8 @@ def _output(
         if len(apart):
             worst = int(np.abs(apart).argmax())
             largest, where = apart[worst], int(index[0][pairs.first][known][worst])
+        if len(apart) >= _LEAST_PAIRS and not any(hardly_apart(x.min(), x.max()) for x in used):
+            (together,) = correlations(centred_ranks(used[0][:, None]), used[1]).tolist()
         if certain:
             ends = placed[0].interval(apart, index[0][pairs.first][known], np.mean)
     else:
@@ -379,9 +408,12 @@ def _output(
                 p.replicate_of(i[k]) for p, i, k in zip(placed, index, there, strict=True)
             )
             ends = intervals.of_difference(used[0], used[1], which)
-    if not all(map(len, used)):
+    if not all(map(len, used)):  # one of them may have none, as of a ring that stays closed
+        used = [each[np.isfinite(each)] for each in values]
+        ends = NONE
+    if not any(map(len, used)):
         return {}
-    means = np.array([each.mean() for each in used])
+    means = np.array([each.mean() if len(each) else np.nan for each in used])
     if not has_means(both, placed, len(pairs.first)):
         means = means * np.nan
     rows: dict[str, tuple[Any, Any, str]] = {
@@ -395,11 +427,12 @@ def _output(
         rows["largest_difference_sample"] = (
             (), np.int64(where), "sample of the first with the largest difference",
         )  # fmt: skip
+        rows["rank_correlation"] = (), together, "rank correlation of pairs"
     meaning, units = both[0][name].attrs.get("long_name", name), quantities()[name].units
     found = {}
     for word, (dims, each, words) in rows.items():
-        unit = units if np.asarray(each).dtype.kind == "f" else "1"  # samples have none
-        found[f"{name}_{word}"] = dims, each, about(f"{words}: {meaning}", unit)
+        plain = np.asarray(each).dtype.kind != "f" or word == "rank_correlation"
+        found[f"{name}_{word}"] = dims, each, about(f"{words}: {meaning}", "1" if plain else units)
     return found
 
 

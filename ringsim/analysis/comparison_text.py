@@ -5,12 +5,15 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.indices import largest_by_chance
 from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
-from ringsim.analysis.study_text import Section, digits_of
+from ringsim.analysis.study_text import Section
+from ringsim.analysis.verdicts import Verdict
 from ringsim.analysis.worst import NOTE, marked
 from ringsim.tables import (
     Table,
     counted,
+    digits_of,
     estimate_text,
     interval_text,
     number_text,
@@ -26,6 +29,9 @@ _ALIKE = 1e-3
 """Difference over the larger mean below which neither is told to be worse, however sure it is."""
 _FRACTIONS = 999.5
 """Percent from which on three digits would take an exponent."""
+_LOW = 0.5
+"""Rank correlation of pairs below which one campaign hardly tells which samples of the other are
+bad: it explains a quarter of the variance of ranks."""
 _SHORT = 16
 """Letters of a name up to which it heads columns."""
 
@@ -53,7 +59,37 @@ def head_lines(found: xr.Dataset) -> list[str]:
             told = f" ({found.attrs[f'{side}_name']})" if title and name != side else ""
             lines.append(f"{side}: {title or found.attrs[f'{side}_name']}{told}")
     lines.append(f"{found.attrs['pairing']}{pairs}")
-    return [*lines, *filter(None, [found.attrs[NOTE], found.attrs["intervals"]]), *_cut_off(found)]
+    lines += [*filter(None, [found.attrs[NOTE], found.attrs["intervals"]]), *_cut_off(found)]
+    return [*lines, *_turned(found), *_other_verdicts(found)]
+
+
+def _turned(found: xr.Dataset) -> Iterator[str]:
+    """Main outputs by which the samples of one are in another order than those of the other."""
+    turned, apart = dict[str, float](), dict[str, float]()
+    for name, variable in quantities().items():
+        if variable.summary is None or f"{name}_rank_correlation" not in found:
+            continue
+        together = found[f"{name}_rank_correlation"].item()
+        pairs = int(found[f"{name}_samples"].values[0])
+        if together < -float(largest_by_chance(pairs, np.zeros(()), 1)):
+            turned[name] = together
+        elif together < _LOW:
+            apart[name] = together
+    for some, sense in (
+        (turned, "turn round: samples that are the worst in one are the best in the other"),
+        (apart, "hardly go together: the worst samples of one are not those of the other"),
+    ):
+        if some:
+            named = ", ".join(f"{name} ({each:+.2f})" for name, each in some.items())
+            yield f"the ranks of pairs {sense} (rank correlation): {named}"
+
+
+def _other_verdicts(found: xr.Dataset) -> Iterator[str]:
+    """The requirements whose verdict is another one in the second."""
+    for text in found["requirement"].values if "kept_verdict" in found else ():
+        first, second = found["kept_verdict"].sel(requirement=text).values.tolist()
+        if first != second:
+            yield f"{text}: {Verdict(first).words} -> {Verdict(second).words}"
 
 
 def _cut_off(found: xr.Dataset) -> Iterator[str]:
@@ -125,8 +161,12 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
             cells = [str(count) for count in counts]
         low, high = one[f"{word}_share_difference_interval"].tolist()
         apart = estimate_text(one[f"{word}_share_difference"].item(), low, high, 3)
-        rows.append((str(name), *cells, apart, interval_text(low, high, 3)))
-    heads = (head, *names_of(found), "difference", "95 % interval")
+        codes = one.get(f"{word}_verdict", np.empty(0)).tolist()
+        verdicts = [Verdict(code).words for code in codes]
+        rows.append((str(name), *cells, apart, interval_text(low, high, 3), *verdicts))
+    heads: tuple[str, ...] = (head, *names_of(found), "difference", "95 % interval")
+    if f"{word}_verdict" in found:
+        heads += tuple(f"verdict in {name}" for name in names_of(found))
     columns = 3 if single else len(heads)
     return marked(Table(heads[:columns], [row[:columns] for row in rows]), found)
 
@@ -156,12 +196,18 @@ def _outputs(found: xr.Dataset) -> Table:
         first, second = found[f"{name}_mean"].values
         if np.isnan(first) and not found.attrs["pairs"]:
             continue
-        factor, unit = readable(variable.units, max(abs(first), abs(second)))
+        counts = found[f"{name}_samples"].values.tolist()
+        factor, unit = readable(variable.units, np.nanmax(np.abs([first, second]), initial=0.0))
         first, second = factor * first, factor * second
         apart = factor * found[f"{name}_difference"].item()
         low, high = factor * found[f"{name}_difference_interval"].values
-        counts = found[f"{name}_samples"].values.tolist()
-        largest, place = "-", "-"
+        if not all(counts):  # that one has none, and how many the other has
+            each = zip((first, second), counts, strict=True)
+            cells = [number_text(value) if count else "none" for value, count in each]
+            used = " and ".join(map(str, counts))
+            rows.append((name, unit_text(unit), *cells, *["-"] * 4, used, *["-"] * 3))
+            continue
+        largest, place, together = "-", "-", "-"
         if f"{name}_largest_difference" in found:
             most = factor * found[f"{name}_largest_difference"].item()
             if all_alike(*sorted((first, second))) and all_alike(*sorted((first, first + most))):
@@ -172,6 +218,7 @@ def _outputs(found: xr.Dataset) -> Table:
                 continue
             largest = number_text(most)
             place = str(found[f"{name}_largest_difference_sample"].item())
+            together = f"{found[f'{name}_rank_correlation'].item():+.2f}".replace("+nan", "-")
         fine = digits_of(min(first, second), max(first, second))
         rows.append((
             name, unit_text(unit),
@@ -180,12 +227,12 @@ def _outputs(found: xr.Dataset) -> Table:
             interval_text(low, high),
             _worse(found, name),
             str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
-            largest, place,
+            largest, place, together,
         ))  # fmt: skip
     head = (
         "output" if found.attrs["runs"] else "mean of", "unit", *names_of(found),
         "difference", "in %", "95 % interval", "worse in",
-        "samples", "largest of a pair", "in sample",
+        "samples", "largest difference of a pair", "in sample", "rank correlation of pairs",
     )  # fmt: skip
     columns = 8 if found.attrs["runs"] else len(head)
     same = "the same in both" if found.attrs["runs"] else "the same in each pair"
@@ -221,5 +268,5 @@ def _worse(found: xr.Dataset, name: str) -> str:
 def differing(found: xr.Dataset) -> Iterator[str]:
     """The outputs that are not the same in both, those first that an engineer fears to be worse."""
     table = _outputs(found)
-    names = [row[0] for row in table.rows]
+    names = [row[0] for row in table.rows if np.isfinite(found[f"{row[0]}_difference"])]
     yield from sorted(names, key=lambda name: not quantities()[name].badness)

@@ -339,6 +339,19 @@ def distribution_of(variable: xr.DataArray) -> dict[str, Any]:
     return found if isinstance(found, dict) else {"text": text}
 
 
+def learnt_lines(campaign: xr.Dataset) -> list[str]:
+    """Which inputs are drawn from what a test has told, a line a test."""
+    found: dict[str, list[str]] = {}
+    for name in inputs(campaign):
+        says = distribution_of(campaign[name])
+        if "remaining_scatter" in says:
+            found.setdefault(str(says.get("data", "")), []).append(called(campaign[name]))
+    return [
+        f"learnt from the test {test}: {', '.join(dict.fromkeys(names))}"
+        for test, names in found.items()
+    ]
+
+
 def law_text(says: Mapping[str, Any]) -> str:
     """A distribution in words: its kind, and its parameters without those that place it.
 

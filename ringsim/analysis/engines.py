@@ -21,7 +21,7 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.ladder import Rung, references
 from ringsim.outputs.family import VARIABLES, Array
-from ringsim.tables import counted, text_table, unit_text
+from ringsim.tables import counted, readable, text_table, unit_text, with_unit
 from ringsim.variables import GOALS, Fate, Outcome, Status
 
 _NOT_CHECKED = -1
@@ -47,6 +47,8 @@ class Difference:
     bars: Array
     """Sum of the error bars that both state, or for one that states none the largest that its
     engine states in other samples, or that of the other engine; NaN without any."""
+    size: float
+    """Largest magnitude of its values, which decides in which unit it is told."""
     standard_error: float
     """Of the mean of all samples that ended well, as the design tells it; NaN if it does not."""
 
@@ -81,7 +83,10 @@ def differences(campaign: xr.Dataset) -> list[Difference]:
         known = good(stand) & np.isfinite(every)
         error = placed.error_of_mean(every[known], stand["sample"].to_numpy()[known])
         samples = campaign["sample"].to_numpy()[both]
-        found.append(Difference(name, variable.units, samples, apart, share, bars[both], error))
+        size = float(np.nanmax(np.abs([frame[both], full[both]])))
+        found.append(
+            Difference(name, variable.units, samples, apart, share, bars[both], size, error)
+        )
     return found
 
 
@@ -108,22 +113,25 @@ def check_lines(campaign: xr.Dataset) -> list[str]:
     if found:
         both = counted(len(found[0].samples), "sample")
         lines.append(f"median and worst are over the {both} that both engines completed")
-    rows = [
-        (
-            each.name, unit_text(each.units),
-            f"{np.median(each.apart):.2g}", f"{each.apart[each.worst]:.2g}",
+    rows = []
+    for each in (each for each in found if each.listed):
+        factor, unit = readable(each.units, each.size)
+        rows.append((
+            each.name, unit_text(unit),
+            f"{factor * np.median(each.apart):.2g}", f"{factor * each.apart[each.worst]:.2g}",
             str(each.samples[each.worst]), f"{each.share[each.worst]:.2g}",
-            _or_dash(each.bars[each.worst]), _or_dash(each.standard_error),
-        )
-        for each in found
-        if each.listed
-    ]  # fmt: skip
+            _or_dash(factor * each.bars[each.worst]), _or_dash(factor * each.standard_error),
+        ))  # fmt: skip
     if rows:
         head = (
-            "difference of", "unit", "median", "worst", "sample", "share", "error bars",
+            "difference of", "unit", "median", "worst", "sample", "share", "both error bars there",
             "standard error",
         )  # fmt: skip
         lines += text_table(head, rows)
+        lines.append(
+            "both error bars there: of the frame and of the full engine together, in the sample of "
+            "the worst difference; share: of the full engine's value"
+        )
     return [*lines, *_other_ends(campaign), *verdict(campaign, found)]
 
 
@@ -158,9 +166,11 @@ def verdict(campaign: xr.Dataset, found: list[Difference]) -> list[str]:
         over = np.flatnonzero(differ(each.name, each.apart, each.bars))
         if len(over):
             k = over[np.argmax(each.apart[over] / each.bars[over])]
+            factor, unit = readable(each.units, each.size)
             beyond.append(
-                f"{each.name} (sample {each.samples[k]}: {each.apart[k]:.2g} {each.units}, "
-                f"error bars {each.bars[k]:.2g})"
+                f"{each.name} (sample {each.samples[k]}: "
+                f"{with_unit(f'{factor * each.apart[k]:.2g}', unit)}, both error bars "
+                f"{factor * each.bars[k]:.2g})"
             )
     lines = []
     if beyond:

@@ -17,7 +17,7 @@ from ringsim.analysis.influence import (
     separating,
     standing_out,
 )
-from ringsim.analysis.intervals import LEVEL, is_moment, quantities
+from ringsim.analysis.intervals import ALIKE, LEVEL, hardly_apart, is_moment, quantities
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, chance_text, counted, interval_text, number_text
@@ -43,7 +43,7 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
     within = places_in(analysis)
     rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
-    lonely = False
+    lonely, alike = False, dict[str, list[str]]()
     named = set[str]()
     for output in _correlated(analysis):
         plain, partial = (
@@ -56,7 +56,9 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         certain = certain or bool(np.isfinite(plain[1]).any())
         used = int(analysis[f"{output}_samples"].values[0])
         least = min(least or used, used)
-        chosen = _largest(plain[0], place, names, within)
+        for k in np.flatnonzero(np.isnan(plain[0])).tolist():
+            alike.setdefault(str(names[k]), []).append(output)
+        chosen = [k for k in _largest(plain[0], place, names, within) if np.isfinite(plain[0][k])]
         named |= {str(names[k]) for k in chosen}
         rows += [
             (
@@ -68,12 +70,10 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
         some = np.isnan(partial[0][chosen])
         lonely |= bool(some.any() and not some.all())
         if some.all() and len(chosen):
-            alike = [str(names[k]) for k in chosen if np.isnan(plain[0][k])]
             alone = np.nanmax(np.abs(plain[0][chosen])) > _ALONE
             why = "one input determines the ranks" if alone else (
                 "too few samples, or correlated inputs"
             )  # fmt: skip
-            why = f"{alike[0]} is the same in all these samples" if alike else why
             lacking.append(f"{output} ({counted(used, 'sample')} used: {why})")
     if lonely:
         notes.append(
@@ -85,6 +85,10 @@ def _correlations_table(analysis: xr.Dataset) -> Table:
             "no partial correlation (effect of one input with the others removed): "
             f"{', '.join(lacking)}"
         )
+    notes += [
+        f"{name} is the same in all samples used for {', '.join(each)}: no correlation with it"
+        for name, each in alike.items()
+    ]
     if rows:
         chance = (
             f"about {(1 - LEVEL) * len(names):.2g} of their intervals exclude zero"
@@ -197,8 +201,16 @@ HEADS = {
 }  # fmt: skip
 
 
-def _ends(interval: Array) -> str:
-    return interval_text(float(interval[0]), float(interval[1]), 2)
+FEW_DECIDE = "few samples decide it"
+"""Instead of an interval that is longer than all that is possible, or leaves it."""
+
+
+def _ends(interval: Array, measure: str = "") -> str:
+    """An interval; of a share of a variance none that is longer than the whole of it."""
+    low, high = interval.tolist()
+    return FEW_DECIDE if measure.endswith("_index") and high - low > 1.0 else interval_text(
+        low, high, 2
+    )  # fmt: skip
 
 
 def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
@@ -231,7 +243,7 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
             for name in names:
                 row.append(number_text(one[name].values[k], 2))
                 if f"{name}_interval" in one:
-                    row.append(_ends(one[f"{name}_interval"].values[k]))
+                    row.append(_ends(one[f"{name}_interval"].values[k], name))
             rows.append([*row, str(one["index_used"].item()), str(one["index_lost"].item())])
     notes = measure_notes(analysis)
     notes += confounding_notes(analysis, named) if dim == "input" else []
@@ -349,9 +361,9 @@ def _second(analysis: xr.Dataset) -> Table:
         values = one["second_order_index"].values
         found = [(j, k) for j in range(len(factors)) for k in range(j) if np.isfinite(values[j, k])]
         for j, k in sorted(found, key=lambda pair: -values[pair])[:_MOST_PLACES]:
-            ends = one["second_order_index_interval"].values[j, k]
+            ends = _ends(one["second_order_index_interval"].values[j, k], "second_order_index")
             rows.append((f"{output} by {factors[k]} with {factors[j]}",
-                         number_text(values[j, k], 2), _ends(ends)))  # fmt: skip
+                         number_text(values[j, k], 2), ends))  # fmt: skip
     head = ("what explains", "second-order index", "95 % interval")
     return marked(Table(head, rows), analysis)
 
@@ -374,9 +386,9 @@ def what_matters(analysis: xr.Dataset) -> Table:
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
     rows, quiet, doubtful, more = [], [], list[str](), list[str]()
-    separated = _separated_groups(analysis)
+    separated, flat = _separated_groups(analysis), _flat(analysis)
     for output, names, others in mattering(analysis):
-        if is_moment(output):
+        if is_moment(output) or output in flat:
             continue
         doubtful += [f"{output} by {name}" for name in others[:_MOST_IN_SHORT]]
         if len(names) > _MOST_IN_SHORT:
@@ -405,11 +417,27 @@ def what_matters(analysis: xr.Dataset) -> Table:
             "not listed, because a correlated input with a larger index explains it (its partial "
             f"rank correlation is not significant): {', '.join(doubtful)}"
         )
+    if flat:
+        notes.append(
+            f"not listed, because samples differ by less than {100 * ALIKE:g} %: {', '.join(flat)}"
+        )
     if quiet:
         notes.append(f"no significant input for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *RANKS.values())
     return marked(Table(head, rows, notes, left=2), analysis, 1)
+
+
+def _flat(analysis: xr.Dataset) -> list[str]:
+    """The outputs of which no digit that tables give changes between samples, unless none does or a
+    requirement asks for them: what explains them is no news.
+    """
+    wanted = analysis["requirement"].values.tolist() if "requirement" in analysis.dims else []
+    known = [name for name in quantities() if name in analysis and not is_moment(name)]
+    known = [name for name in known if name in _correlated(analysis)]
+    ends = {name: analysis[name].sel(statistic=["minimum", "maximum"]).values for name in known}
+    flat = [name for name in known if name not in wanted and hardly_apart(*ends[name].tolist())]
+    return flat if len(flat) < len(known) else []
 
 
 def mattering(analysis: xr.Dataset) -> Iterator[tuple[str, list[str], list[str]]]:
@@ -474,7 +502,8 @@ def _row_of(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ...]:
         names = one[dim].values.tolist()
         if name in names:  # of blocks whose outputs have no index these are groups, not inputs
             k = names.index(name)
-            cells = number_text(one[measure].values[k], 2), _ends(_index_ends(one, measure)[k])
+            ends = _ends(_index_ends(one, measure)[k], measure)
+            cells = number_text(one[measure].values[k], 2), ends
     return name, *cells, *_correlations(analysis, output, name)
 
 

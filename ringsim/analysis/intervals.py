@@ -74,6 +74,26 @@ def all_alike(least: Array | float, most: Array | float) -> Any:
     return np.equal(least, most) | near | (largest < NOTHING)
 
 
+ALIKE = 1e-3
+"""Range of an output over its size below which no digit that tables give of it changes."""
+
+
+def hardly_apart(least: float, most: float) -> bool:
+    """Whether values of that range are the same to all digits that tables give."""
+    return bool(most - least < ALIKE * max(abs(least), abs(most))) or bool(all_alike(least, most))
+
+
+ONE_DECIDES = "one sample decides it"
+"""Instead of an interval that says nothing."""
+
+
+def of_one(deviation: float, farthest: float, count: int) -> bool:
+    """Whether one of so many values, the ``farthest`` from their mean, makes more than half of the
+    sum of squares: their standard deviation is then a number about that value alone.
+    """
+    return 2.0 * farthest**2 > (count - 1) * deviation**2
+
+
 def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
     """Interval of the mean (``np.mean``) or of the ``spread`` of independent samples.
 

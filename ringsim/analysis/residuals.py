@@ -10,6 +10,7 @@ from ringsim.outputs.family import VARIABLES
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, unit_text
+from ringsim.variables import GOALS
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,8 @@ def residuals(run: xr.Dataset, measurement: Measurement) -> list[Residuals]:
     return [_of(run, readings) for readings in measurement.readings]
 
 
-def _of(run: xr.Dataset, readings: Readings) -> Residuals:
+def _at_place(run: xr.Dataset, readings: Readings) -> xr.DataArray:
+    """What a run or a campaign has of a sensor's variable at its place."""
     sensor = readings.sensor
     if sensor.variable not in run:
         raise InputError(
@@ -67,6 +69,11 @@ def _of(run: xr.Dataset, readings: Readings) -> Residuals:
             hint = known_or_nearest(str(label), list(map(str, labels)))
             raise InputError(f"sensor {sensor.name}: the run has no {dim} {show(label)} ({hint})")
         found = found.sel({dim: label})
+    return found
+
+
+def _of(run: xr.Dataset, readings: Readings) -> Residuals:
+    found = _at_place(run, readings)
     if "time" not in found.dims:
         value = np.full(1, float(found))
         there = np.isfinite(value)  # a ring that stalls has no deployment time
@@ -79,6 +86,52 @@ def _of(run: xr.Dataset, readings: Readings) -> Residuals:
     inside = (at >= times[0]) & (at <= times[-1]) if len(times) else np.zeros(len(at), dtype=bool)
     computed = np.interp(at[inside], times, values) if inside.any() else np.zeros(0)
     return Residuals(readings, at[inside], readings.values[inside], computed, int((~inside).sum()))
+
+
+def predictions(
+    campaign: xr.Dataset, measurement: Measurement, offset: Array | None = None,
+    drift: Array | None = None,
+) -> list[Array]:  # fmt: skip
+    """What each sensor would read in each run of a campaign, shape (samples, readings) each, in the
+    variable's units; NaN where a run has no value.
+
+    ``offset`` (s) and ``drift`` of the clock in each run, shape (samples,), take the place of the
+    measured file's.  Runs end once an antenna is deployed: its joints stay where they locked.
+    """
+    clock, samples = measurement.file.clock, campaign.sizes["sample"]
+    known = (0.0, 0.0) if clock is None else (clock.offset, clock.drift)
+    starts, rates = (np.full(samples, was) if now is None else now
+                     for was, now in zip(known, (offset, drift), strict=True))  # fmt: skip
+    # From the time of the run by the file's clock to that by each run's own, t' = shift + scale t.
+    scale = (1.0 + rates) / (1.0 + known[1])
+    shift = starts - known[0] * scale
+    stays = np.isin(campaign["outcome"].to_numpy(), [int(goal) for goal in GOALS])
+    found = []
+    for readings in measurement.readings:
+        values = _at_place(campaign, readings)
+        if "time" not in values.dims:
+            each, name = values.to_numpy().astype(float), readings.sensor.variable
+            if VARIABLES[name].units == "s" and clock is not None:
+                # Back to what the file's clock would have shown of an instant, or of a duration.
+                each = (each - shift * name.endswith("_time")) / scale
+            found.append(each[:, None])
+            continue
+        times, rows = values["time"].to_numpy(), values.transpose("sample", "time").to_numpy()
+        holds = stays & (readings.sensor.variable == "opening_angle")
+        found.append(np.array([
+            _at(shift[k] + scale[k] * readings.times, times, row, holds=bool(holds[k]))
+            for k, row in enumerate(rows)
+        ]))  # fmt: skip
+    return found
+
+
+def _at(wanted: Array, times: Array, values: Array, *, holds: bool) -> Array:
+    """Values at other times, by lines; NaN before the first and after the last, unless it holds."""
+    known = np.isfinite(values)
+    if not known.any():
+        return np.full(len(wanted), np.nan)
+    last = values[known][-1] if holds else np.nan
+    return np.interp(wanted, times[known], values[known], left=np.nan, right=last)
 
 
 def residual_statistics(found: list[Residuals]) -> xr.Dataset:

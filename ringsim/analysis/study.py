@@ -20,6 +20,7 @@ from ringsim.analysis.design import (
     Placement,
     endings,
     kinds_of_ends,
+    learnt_lines,
     placement,
     population_of,
     scalars,
@@ -44,7 +45,14 @@ from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge, stopping_lines
-from ringsim.analysis.worst import NOTE, losses, one_at_a_time, other_than_base, worst
+from ringsim.analysis.worst import (
+    NOTE,
+    losses,
+    margins,
+    one_at_a_time,
+    other_than_base,
+    worst,
+)
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml, read_text
 from ringsim.parts.solver import NO_DEVIATIONS
@@ -93,7 +101,8 @@ def analyse(
         ``NAME_largest_error`` and its sample along ``source``;
         ``balance_...``, errors of the solution; ``outcome_...`` along ``kind``; verdicts along
         ``requirement``; what matters along ``input`` and ``output``, see ``influence`` and
-        ``sensitivity``; the worst samples along ``worst``.  NaN stands for what the samples do not
+        ``sensitivity``; the worst samples along ``worst``; margins to the scene's limits along
+        ``limit``.  NaN stands for what the samples do not
         tell; ``intervals`` among the attributes says what intervals are from, or why there are
         none.
 
@@ -123,6 +132,7 @@ def analyse(
             "campaign_identity": campaign.attrs.get("identity", ""),
             "samples": campaign.sizes["sample"], "samples_run": int(ran(campaign).sum()),
             "design": placed.kind, "intervals": placed.told,
+            "learnt": "; ".join(learnt_lines(campaign)),
             "stopping": "".join(stopping_lines(campaign, placed)), NOTE: losses(campaign).note,
             "remarks": "\n".join(remark_lines(campaign)),
         },
@@ -133,7 +143,7 @@ def analyse(
     single = one_at_a_time(campaign)  # what each change does is told case by case
     matter = xr.Dataset() if single else influence(stand, wanted, placed)
     more = [outcomes(stand, placed), matter, *([cases(campaign)] if single else [])]
-    more += [worst(stand, wanted, matter)]
+    more += [worst(stand, wanted, matter), margins(campaign)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]
     if reweighted:

@@ -9,6 +9,7 @@ import xarray as xr
 
 from ringsim.analysis.design import FAILED_RUNS, law_text, placement, population_of
 from ringsim.analysis.influence_text import (
+    FEW_DECIDE,
     influence_tables,
     refusals,
     sensitivity_tables,
@@ -18,9 +19,11 @@ from ringsim.analysis.influence_text import (
 from ringsim.analysis.intervals import (
     LEAST_OF_BOOTSTRAP,
     NOTHING,
+    ONE_DECIDES,
     all_alike,
     is_moment,
     numbers,
+    of_one,
     quantities,
     ranks,
 )
@@ -35,12 +38,23 @@ from ringsim.analysis.reweighting import (
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
-from ringsim.analysis.worst import MARK, NOTE, losses, marked, worst_lines, worst_tables
+from ringsim.analysis.worst import (
+    MARK,
+    NOTE,
+    losses,
+    margin_table,
+    margins,
+    marked,
+    worst_lines,
+    worst_tables,
+)
 from ringsim.refusal import InputError
 from ringsim.tables import (
     Table,
     counted,
+    digits_of,
     estimate_text,
+    fine_text,
     interval_text,
     number_text,
     readable,
@@ -77,13 +91,14 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
             few = decisive < (LEAST_OF_MEAN if statistic == "mean" else LEAST_OF_SHARE)
             thin |= few
             factor, unit = unit_of(analysis, name)
+            lowest = analysis[name].sel(statistic="minimum").item()
             drawn, reweighted, low, high = factor * np.array([
                 one[name], one[f"{name}_reweighted"], *one[f"{name}_reweighted_interval"]
             ])  # fmt: skip
             rows.append((
                 f"{name}{THIN * few}{bent}", unit, statistic.replace("_", " "),
                 number_text(drawn), estimate_text(reweighted, low, high),
-                interval_text(low, high),
+                FEW_DECIDE if low < 0.0 <= lowest else interval_text(low, high),
                 number_text(one[f"{name}_effective_samples"].item(), 3), number_text(decisive, 3),
             ))  # fmt: skip
     for event in analysis["event"].values:
@@ -129,9 +144,9 @@ def _verdicts(analysis: xr.Dataset) -> Table:
             number_text(one["reweighted_probability"].item()),
             _decisive(Verdict(one["reweighted_verdict"].item()), *one["reweighted_bounds"].values),
         ))  # fmt: skip
-    head = ("requirement, reweighted", "probability", "confidence", "verdict", "estimate",
+    head = ("requirement, reweighted", "probability", "confidence", "verdict", _MET,
             _BOUND)  # fmt: skip
-    return marked(Table(head, rows), analysis, head.index("estimate"))
+    return marked(Table(head, rows), analysis, head.index(_MET))
 
 
 # An analysis of a campaign as lines for people.
@@ -182,7 +197,7 @@ def sections(
         ),
         Section("matters", "What matters", short, more.get("matters", ())),
         Section("worst", "The worst samples", worst_tables(analysis, folder)),
-        Section("requirements", "Requirements", [verdict_table(analysis)]),
+        Section("requirements", "Requirements", [margin_table(analysis), verdict_table(analysis)]),
         Section("reweighting", "Other distributions", reweighting_tables(analysis)),
     )
     return {
@@ -246,7 +261,8 @@ def head_lines(analysis: xr.Dataset) -> list[str]:
     counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts]
-    lines += [*filter(None, [analysis.attrs[NOTE]]), analysis.attrs["intervals"]]
+    told = (analysis.attrs.get("learnt", ""), analysis.attrs[NOTE], analysis.attrs["intervals"])
+    lines += filter(None, told)
     if "tail_probability" in analysis:
         lines.append(
             "no sensitivity to inputs is given: samples of subset simulation depend on each "
@@ -264,6 +280,8 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
     lines = [*filter(None, [lost.note])]
     lines += [line + lost.mark for line in stopping_lines(campaign, placed)]
     lines += tail_table(found).lines()
+    known = margins(campaign).assign_attrs({NOTE: lost.note})
+    lines += slim(margin_table(known)).lines() if known.data_vars else []
     try:
         found = judge(population_of(campaign), required_by(campaign.attrs), placed)
     except InputError as error:
@@ -289,6 +307,7 @@ def not_met(analysis: xr.Dataset) -> list[str]:
 def verdict_table(analysis: xr.Dataset) -> Table:
     """The verdicts, a row a requirement; no rows without requirements."""
     rows, notes, chosen = [], list[str](), False
+    never = dict[tuple[str, str], list[str]]()
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         variables = analysis.sel(requirement=name).variables
         one = {str(n): v.values.item() for n, v in variables.items() if not v.dims}
@@ -319,6 +338,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
                 f"{name}: violated with a probability of {share} ({low} .. {high}, each bound with "
                 "the confidence required)"
             )
+        elif not bad and used and np.isfinite(one["probability_lower"]):
+            most = number_text(1.0 - one["probability_lower"], 2)
+            never.setdefault((most, f"{one['confidence_required']:g}"), []).append(str(name))
         if verdict != alone:
             notes.append(
                 f"{name}: without the failed runs it would be {alone.words}; run them again "
@@ -337,16 +359,22 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             notes.append(
                 f"{name}: violations without a value (the antenna did not get that far): {missing}"
             )
+    notes = [
+        f"no sample violates {', '.join(names)}: the probability of a violation is at most {most} "
+        f"(confidence {level})"
+        for (most, level), names in never.items()
+    ] + notes
     if rows:
         notes.insert(0, _CHOSEN if chosen else _DECIDES)
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
-        "verdict", "estimate", _BOUND, "samples used", "violating", "failed runs",
+        "verdict", _MET, _BOUND, "samples used", "violating", "failed runs",
         "verdict without failed runs", "samples to go",
     )  # fmt: skip
-    return marked(Table(head, rows, notes), analysis, head.index("estimate"))
+    return marked(Table(head, rows, notes), analysis, head.index(_MET))
 
 
+_MET = "share that meets it"
 _BOUND = "one-sided bound"
 _DECIDES = (
     "the one-sided bound, at the confidence required, decides each verdict; where neither the "
@@ -385,7 +413,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
 
 
 def _parts() -> list[str]:
-    return [f"in first {part:.0%}" for part in PARTS[:-1]]
+    return [f"of the first {100 * part:.0f} %" for part in PARTS[:-1]]
 
 
 def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
@@ -403,7 +431,8 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         count = str(used) if used == run else f"{used} of {run}"
         within = factor * float(analysis[f"{name}_same_within"])
         if all_alike(least, most) or np.isfinite(within):
-            value = "0" if abs(mean) < NOTHING else f"{number_text(mean)} {units}".rstrip()
+            value = mean if np.isfinite(mean) else least  # no mean without a population
+            value = "0" if abs(value) < NOTHING else f"{number_text(value)} {units}".rstrip()
             error = f" (within its error bar of {within:.2g} {units}".rstrip() + ")"
             alike.append(
                 f"{name} {value}{error * (within > 0)}" + f" (in {count})" * int(used < run)
@@ -413,15 +442,15 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
             low, high = (factor * analysis[f"{name}_interval"].values[0]).tolist()
             scatters = np.isfinite(analysis[f"{name}_error_of_mean"].values[0])
             few |= bool(scatters and np.isnan(low) and used < LEAST_OF_BOOTSTRAP)
-            others = [number_text(v, fine) for v in (*quantiles, least, most)]
+            others = [fine_text(v, fine) for v in (*quantiles, least, most)]
             worst = int(analysis[f"{name}_worst_sample"])
             rows.append((
                 name, units, estimate_text(mean, low, high, fine), interval_text(low, high, fine),
                 number_text(deviation), *others, "-" if worst < 0 else str(worst), count,
             ))  # fmt: skip
     head = (
-        "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
-        "most", "worst sample", "samples used",
+        "output", "unit", "mean", "95 % interval of it", "std. dev.", "5 %", "median", "95 %",
+        "least", "most", "worst sample", "samples used",
     )  # fmt: skip
     notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
@@ -447,16 +476,6 @@ def unit_of(analysis: xr.Dataset, name: str) -> tuple[float, str]:
     return factor, unit_text(units)
 
 
-def digits_of(least: float, most: float) -> int:
-    """Four, or so many that a narrow range has two of its own.
-
-    >>> digits_of(22.19, 33.5), digits_of(4.99623, 4.99725)
-    (4, 5)
-    """
-    larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
-    return max(4, int(np.log10(larger)) + 2)
-
-
 def every_statistic(analysis: xr.Dataset) -> Table:
     """A row a statistic of each output, with its interval, its convergence, and whose it is."""
     rows = []
@@ -465,6 +484,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
         factor, units = unit_of(analysis, name)
         values = factor * analysis[name].values
         least, most = values[-2:]
+        far = max(most - values[0], values[0] - least)
         fine = digits_of(least, most)
         for k, statistic in enumerate(STATISTICS):
             value = values[k]
@@ -475,6 +495,9 @@ def every_statistic(analysis: xr.Dataset) -> Table:
             digits = 4 if statistic == "standard_deviation" else fine
             first = factor * analysis.variables[f"{name}_convergence"].values[:-1, k]
             low, high = (factor * analysis.variables[f"{name}_interval"].values[k]).tolist()
+            alone = ""
+            if statistic == "standard_deviation" and of_one(value, far, int(used)):
+                alone, low, high = ONE_DECIDES, np.nan, np.nan
             side, who = k - len(STATISTICS) + 2, ("-", "-")
             if side >= 0 and not same:
                 bar = factor * analysis[f"{name}_end_error"].values[side]
@@ -483,7 +506,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
                 name, units,
                 "all" if same else statistic.replace("_", " "),
                 estimate_text(value, low, high, digits),
-                interval_text(low, high, digits), *who,
+                alone or interval_text(low, high, digits), *who,
                 *(number_text(v, digits) for v in first), used, lost, absent,
             ))  # fmt: skip
     head = (
@@ -519,10 +542,13 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         factor, units = unit_of(analysis, name)
         errors, largest = factor * errors, factor * largest
         cells = [number_text(errors[0], 2)]
+        nothing = max(_NO_ERROR * max(abs(least), abs(most)), NOTHING) * factor
         for error, count, most_of_all, sample in list(
             zip(errors, counts, largest, samples, strict=True)
         )[1:]:
-            told = [number_text(error, 2), str(count), f"{most_of_all:.2g} (sample {sample})"]
+            told = ["0" if error < nothing else number_text(error, 2), str(count), "0"]
+            if most_of_all >= nothing:
+                told[2] = f"{most_of_all:.2g} (sample {sample})"
             cells += told if count else ["-"] * 3
         rows.append((name, units, *cells, dominating(errors)))
     head = (
@@ -546,6 +572,10 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
     if (remarks := analysis.attrs.get("remarks")) and not wanted:
         tables.append(Table((), (), remarks.split("\n")))
     return tables
+
+
+_NO_ERROR = 1e-7
+"""Error over the value below which it is told as 0: no output is known to so many digits."""
 
 
 def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:

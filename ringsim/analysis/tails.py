@@ -17,8 +17,7 @@ from ringsim.analysis.intervals import (
     share_interval,
     student,
 )
-from ringsim.sampling.designs.levels import SubsetSimulation
-from ringsim.sampling.subset_levels import Repetition
+from ringsim.sampling.designs.levels import Repetition, SubsetSimulation
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, chance_text, with_unit
 from ringsim.variables import Status, about

@@ -1,6 +1,7 @@
 """The worst samples, what is unusual in them, and what lost runs leave open."""
 
 import shlex
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ from ringsim.analysis.design import (
     endings,
     inputs,
     kinds_of_ends,
+    paths_of,
     place_names,
     placement,
     short_of_goal,
@@ -26,8 +28,10 @@ from ringsim.analysis.influence import separating, standing_out
 from ringsim.analysis.intervals import ROUND_OFF, Mask, good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
+from ringsim.outputs import OUTPUTS
+from ringsim.overrides import flat
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table, chance_text, counted, with_unit
+from ringsim.tables import Table, chance_text, counted, number_text, readable, with_unit
 from ringsim.variables import about
 
 # What is unusual in the inputs of a sample, in words.
@@ -335,8 +339,13 @@ def _found(campaign: xr.Dataset, name: str, place: int) -> str:
     if np.isfinite(value):
         units = quantities()[name].units
         return with_unit(f"{value:.4g}", units)
-    why = str(campaign["reason"].to_numpy()[place]).split("; ")[0] if "reason" in campaign else ""
+    why = first_clause(str(campaign["reason"].to_numpy()[place])) if "reason" in campaign else ""
     return f"no value: {why}" if name else why
+
+
+def first_clause(reason: str) -> str:
+    """Why a run ended, without what follows from it."""
+    return reason.split("; ")[0]
 
 
 def command(folder: str, sample: int) -> str:
@@ -374,6 +383,99 @@ def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
         for sample, value, odd, again in table.rows:
             lines += [f"  sample {sample}: {value}", f"    inputs: {odd}", f"    {again}"]
     return [*lines, *filter(None, [note_on_unusual(analysis)])] if lines else []
+
+
+# How far the worst samples stay from the limits of the scene, and from the drive that they need.
+
+
+_SLACK = ("slack_duration", "longest_slack")
+_DRIVE = "least_drive_margin"
+_AT_ONCE = 64
+"""Samples whose series are read at once."""
+
+
+def margins(campaign: xr.Dataset) -> xr.Dataset:
+    """The margin to each limit of the scene along ``limit``, of the worst of the samples whose
+    numbers hold.
+
+    ``limit_text`` (as "limits.tension = 80 N"), ``limit_output``, ``limit_margin`` (limit over the
+    largest value, less 1), ``limit_value`` and ``limit_sample``; a limit holds for the whole run,
+    so that values behind the last lock count, too.  Behind these the drive margin of scenes with
+    one, which is one already.  Empty without any.
+    """
+    scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
+    own = {path: name for name in inputs(campaign) for path in paths_of(campaign[name])}
+    rows = list[tuple[str, str, float, float, int]]()
+    for limit, peak, series in _limited():
+        path = f"limits.{limit}"
+        if peak not in campaign or (path not in scene and path not in own):
+            continue
+        allowed = numbers(campaign, own[path]) if path in own else float(scene[path])
+        values = _largest(campaign, peak, series)
+        ratio = np.where(good(campaign) & (values > 0.0), allowed / values - 1.0, np.nan)
+        if not np.isfinite(ratio).any():
+            continue
+        k, units = int(np.nanargmin(ratio)), quantities()[peak].units
+        bound = float(np.broadcast_to(allowed, ratio.shape)[k])
+        told = f"{path} = {with_unit(f'{bound:g}', units)}"
+        rows.append((told, peak, float(ratio[k]), float(values[k]), k))
+    least = np.where(good(campaign), numbers(campaign, _DRIVE), np.nan)
+    if np.isfinite(least).any():
+        k = int(np.nanargmin(least))
+        rows.append((f"{_DRIVE} >= 0", _DRIVE, float(least[k]), float(least[k]), k))
+    if not rows:
+        return xr.Dataset()
+    texts, names, margin, value, places = zip(*rows, strict=True)
+    columns = {
+        "text": (np.array(texts, dtype=object), {"long_name": "limit of the scene"}),
+        "output": (np.array(names, dtype=object), {"long_name": "output that it bounds"}),
+        "margin": (np.array(margin), about("limit over the worst value, less 1; drive margin")),
+        "value": (np.array(value), about("worst value of all samples, in the output's unit")),
+        "sample": (campaign["sample"].to_numpy()[[*places]], about("sample with that value")),
+    }
+    return xr.Dataset({f"limit_{name}": ("limit", *each) for name, each in columns.items()})
+
+
+def _limited() -> Iterator[tuple[str, str, str]]:
+    """Limits of loads by their names, with the output that each bounds, and its series."""
+    for output in OUTPUTS:
+        for one in output.variables if output.limit else ():
+            if one.largest_of == output.variables[0].name:
+                yield output.limit, one.name, output.variables[0].name
+    yield *_SLACK, ""
+
+
+def _largest(campaign: xr.Dataset, peak: str, series: str) -> Array:
+    """Largest values at any time of the runs, shape (samples,); NaN without one."""
+    found = numbers(campaign, peak)
+    if series not in campaign:
+        return found
+    for first in range(0, len(found), _AT_ONCE):
+        rows = slice(first, first + _AT_ONCE)
+        values = campaign[series].isel(sample=rows).transpose("sample", ...).to_numpy()
+        flat_rows = values.reshape(len(values), -1)
+        found[rows] = np.fmax(found[rows], np.fmax.reduce(flat_rows, axis=1, initial=np.nan))
+    return found
+
+
+def margin_table(analysis: xr.Dataset) -> Table:
+    """The margins, a row a limit; no rows without."""
+    if "limit" not in analysis.dims:
+        return Table((), ())
+    rows = []
+    columns = (analysis[f"limit_{word}"].values.tolist()
+               for word in ("text", "output", "margin", "value", "sample"))  # fmt: skip
+    for told, name, margin, value, sample in zip(*columns, strict=True):
+        factor, units = readable(quantities()[name].units, value)
+        worst = with_unit(number_text(factor * value), units)
+        short = "" if margin >= 0.0 else ": NOT enough"
+        rows.append((told, name, worst, f"{margin:+.3g}{short}", str(sample)))
+    notes = [
+        "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
+        "safety F it is (1 + margin) / F - 1"
+    ] * any(name != _DRIVE for _, name, *_ in rows)
+    head = ("limit", "of", "worst value", "margin", "in sample")
+    return marked(Table(head, rows, notes, left=2), analysis, 2)
 
 
 # Lost runs that bend what the others tell: which lines they bend, and the mark on these.

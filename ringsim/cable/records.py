@@ -363,6 +363,10 @@ def _fault(fault: Any, present: Sequence[str], paths: Sequence[Sequence[str]], n
     made = dict(fault)
     if fault.get("cable") in present:
         made["cable"] = present.index(fault["cable"]) + 1
+    elif isinstance(given := fault.get("cable"), str) and present:
+        words = [*(f'"{name}"' for name in present), *map(str, range(1, len(present) + 1))]
+        known = f"{', '.join(words[:-1])} or {words[-1]}"
+        raise ValueError(f'faults[{number}].cable = "{given}" must be {known}')
     cable = made.get("cable", 1)
     path = paths[cable - 1] if cable in range(1, len(paths) + 1) else ()
     for key, names, end in (("pulley", path[1:-1], path[-1:]), ("span", spans_of(path), ())):

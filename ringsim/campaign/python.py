@@ -77,14 +77,8 @@ class Campaign:
         name: str = "campaign", **keys: Any,
     ) -> None:  # fmt: skip
         given = scene if isinstance(scene, Scene) else None
-        called = scene.name if isinstance(scene, Scene) else str(scene)
-        table = {"name": name, "seed": seed, "scene": called, "inputs": inputs, "design": design}
-        text = tomli_w.dumps({k: _plain(v) for k, v in (table | keys).items() if v is not None})
-        if given is not None:
-            text += (
-                "\n# The scene was given as a Python object: see the attribute scene for all its "
-                "values."
-            )
+        table = {"name": name, "seed": seed, "inputs": inputs, "design": design} | keys
+        text = campaign_text(scene, table)
         self._described = campaign_of(text, Path(_NAME), scene=given)
 
     def __repr__(self) -> str:
@@ -204,6 +198,16 @@ class Campaign:
         if apart := too_far(found):
             return f"{folder}: {apart[0]}"
         return ""
+
+
+def campaign_text(scene: Scene | str | Path, keys: Mapping[str, Any]) -> str:
+    """The text of a campaign file from Python values, those that are None left out."""
+    called = scene.name if isinstance(scene, Scene) else str(scene)
+    table = {"scene": called} | {k: _plain(v) for k, v in keys.items() if v is not None}
+    text = tomli_w.dumps(table)
+    if isinstance(scene, Scene):
+        text += "\n# The scene was a Python object: see the attribute scene for all its values."
+    return text
 
 
 def open_campaign(path: str | Path) -> xr.Dataset:

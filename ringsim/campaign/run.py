@@ -349,6 +349,10 @@ class Order(NamedTuple):
     solver: str = ""
     """What maps a scene to its outcome instead of the fidelity's."""
     judge: str = SOLVERS["full"]
+    more: bool = False
+    """Whether another order follows from the results of this one."""
+    brief: bool = False
+    """Whether nothing is told of the results."""
 
     @property
     def solving(self) -> str:
@@ -384,7 +388,7 @@ class Order(NamedTuple):
             campaign = grown(self.campaign, self.folder)
             prepare_folder(campaign, self.folder, solver=self.solving, judge=self.judge)
             open_folder(self.folder).survey()  # here, where a refusal reaches all ranks
-            return grows(campaign) and not self.again and is_open(campaign)
+            return self.more or (grows(campaign) and not self.again and is_open(campaign))
         begun = open_folder(self.folder)
         if (held := begun.attributes["campaign_name"]) != name:
             raise InputError(
@@ -397,7 +401,7 @@ class Order(NamedTuple):
 
     @property
     def choices(self) -> tuple[Any, ...]:
-        """All ``Choices`` but the scheduler and whether more follow, in their order."""
+        """All ``Choices`` but the scheduler and the last two, in their order."""
         wanted = self.campaign.specification
         again = FAILED if self.again else frozenset[Status]()
         return wanted.limits, wanted.max_failed, self.share, again, self.overrides
@@ -441,7 +445,7 @@ def _start(scheduler: Scheduler, order: Callable[[], Order], then: Callable[[Pat
             if first:
                 try:
                     made = order()
-                    placed = made.folder, (*made.choices, made.prepare())
+                    placed = made.folder, (*made.choices, made.prepare(), made.brief)
                 except InputError as error:
                     placed = error
             if isinstance(placed := scheduler.from_first(placed), InputError):
@@ -479,6 +483,20 @@ def run_cases(
     InputError if a case or the folder is refused, which changes no file; KeyboardInterrupt after a
     signal: call again.
     """
+    campaign = listed_cases(
+        folder, name, scene, cases, title=title, timeout=timeout, fidelity=fidelity
+    )
+    choices = Choices(Local(workers), campaign.specification.limits, again=again, brief=True)
+    if run_campaign(folder / name, choices) == EXIT_INTERRUPTED:
+        raise KeyboardInterrupt
+    return folder / name / MERGED
+
+
+def listed_cases(
+    folder: Path, name: str, scene: Scene, cases: Sequence[Mapping[str, Any]], *, title: str,
+    timeout: float, fidelity: str,
+) -> Campaign:  # fmt: skip
+    """The campaign of these cases, prepared in ``folder``/``name``; see :func:`run_cases`."""
     paths, listed = list(cases[0]), io.StringIO()
     writer = csv.DictWriter(listed, paths, lineterminator="\n")
     writer.writeheader()
@@ -505,7 +523,4 @@ def run_cases(
         prepare_folder(campaign, folder / name, solver=SOLVERS[fidelity])
     for each, text in texts.items():
         write_text(folder / each, text)
-    choices = Choices(Local(workers), campaign.specification.limits, again=again, brief=True)
-    if run_campaign(folder / name, choices) == EXIT_INTERRUPTED:
-        raise KeyboardInterrupt
-    return folder / name / MERGED
+    return load_campaign(folder / file)

@@ -1,11 +1,13 @@
 """The campaign file: which scene, which inputs, which design, which limits."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from ringsim.analysis.intervals import quantities
@@ -20,7 +22,15 @@ from ringsim.overrides import flat
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Correlation, Table
 from ringsim.sampling.designs.family import Design
-from ringsim.sampling.table import AnyDesign, AnyDistribution, draw, first_inside
+from ringsim.sampling.distributions import Distribution, plain
+from ringsim.sampling.table import (
+    AnyDesign,
+    AnyDistribution,
+    Learnt,
+    draw,
+    first_inside,
+    learnt_from,
+)
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
 from ringsim.units import Model
@@ -65,7 +75,7 @@ class Specification(Model):
     inputs: Annotated[
         dict[str, AnyDistribution], BeforeValidator(lambda table: flat(table, "kind"))
     ] = Field(default_factory=dict)
-    """Distribution by scene path."""
+    """Distribution by scene path; ``from = "posterior.nc"`` adds what a calibration has found."""
     correlations: list[Correlation] = Field(default_factory=list)
     """Pairs of inputs that depend on each other."""
     design: AnyDesign
@@ -160,6 +170,22 @@ class Specification(Model):
         return Rule(conditions=self.stop_when, looks=self.looks) if self.stop_when else None
 
 
+def _cure(error: str, inputs: Mapping[str, Distribution]) -> str:
+    """What helps against a drawn value that is refused for a bound; empty if that is said, or if
+    its distribution has ends of its own.
+    """
+    bound = re.search(r"must be (at least|above|at most|below) (\S+)", error)
+    path = max((path for path in inputs if f"{path} = " in error), key=len, default="")
+    if bound is None or not path or "truncate" in error:
+        return ""
+    law = inputs[path]
+    ends = np.array(law.quantile(np.array([0.0, 1.0])))
+    if ends.dtype.kind != "f" or np.isfinite(ends).all():
+        return ""
+    side, kind = "low" if bound[1] in ("at least", "above") else "high", show(kind_of(law))
+    return f': draw it with kind = "truncated", {side} = {bound[2]}, of = {{ kind = {kind}, ... }}'
+
+
 @dataclass(frozen=True)
 class Campaign:
     """A campaign file, its text and content, and the scene that its samples vary."""
@@ -180,7 +206,8 @@ class Campaign:
                 folder=self.file.parent, error_bars_every=wanted.error_bars_every,
             )  # fmt: skip
         except InputError as error:
-            raise InputError(f"{self.file.name}: {error}") from None
+            cure = _cure(str(error), wanted.inputs)
+            raise InputError(f"{self.file.name}: {error}{cure}") from None
         for path in [column.path for column in table.columns if column.path]:
             if given := path if path in wanted.set else first_inside(path, wanted.set):
                 raise InputError(
@@ -188,6 +215,39 @@ class Campaign:
                     "input: leave out one of the two"
                 )
         return table
+
+
+def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str]]:
+    """Put what ``inputs.from`` names into the tables of a campaign file, in its place; the name of
+    that file, and those of its inputs.
+    """
+    inputs = table.get("inputs")
+    if not isinstance(inputs, dict) or "from" not in inputs:
+        return "", []
+    given = inputs["from"]
+    given = {"file": given} if isinstance(given, str) else given
+    try:
+        source = Learnt.model_validate(given)
+    except ValidationError as error:
+        raise InputError(explain(error, Learnt, f"{path.name}: inputs.from")) from None
+    try:
+        found, pairs = learnt_from(path.parent / source.file, source.without)
+    except InputError as error:
+        raise InputError(f"{path.name}: {error}") from None
+    own = flat({name: law for name, law in inputs.items() if name != "from"}, "kind")
+    for key, names in (("inputs", own), ("set", flat(table.get("set") or {}))):
+        if twice := next((name for name in found if name in names), ""):
+            raise InputError(
+                f"{path.name}: {twice} is given by {key} and by inputs.from, too: leave it out "
+                f"there, or here by without = [{show(twice)}]"
+            )
+    table["inputs"] = {**own, **found}
+    table["correlations"] = [*(table.get("correlations") or []), *pairs]
+    return source.file, list(found)
+
+
+def _median(law: Distribution) -> Any:
+    return plain(law.quantile(np.array([0.5]))[0])
 
 
 def load_campaign(
@@ -223,6 +283,7 @@ def campaign_of(
             )
         design["samples"] = samples
         text += f"\n# called with --samples {samples}"
+    source, learnt = _add_learnt(table, path)
     try:
         specification = Specification.model_validate(table)
     except ValidationError as error:
@@ -237,6 +298,15 @@ def campaign_of(
         varied = base.with_values(specification.set)
     except InputError as error:
         raise InputError(f"{path.name}: {key}: {error}") from None
+    for name in learnt:
+        law = specification.inputs[name]
+        try:
+            varied.with_values(dict.fromkeys(law.shared or (name,), _median(law)))
+        except InputError as error:
+            raise InputError(
+                f"{path.name}: inputs.from = {show(source)}: {name} of it is nothing that this "
+                f"scene can have ({error}): leave it out by without = [{show(name)}]"
+            ) from None
     if (interval := varied.record.state_interval) is not None:
         raise InputError(
             f"{path.name}: record.state_interval = {interval:g} s: campaigns store no states: "

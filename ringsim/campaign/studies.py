@@ -144,7 +144,8 @@ class _Study:
                 missing.setdefault(self._campaign(stage, rung), {})[key] = rung
         for (name, stress, fidelity), own in missing.items():
             given = {path: next(iter(own.values())).values[path] for path in shared}
-            scene = self.scene.with_values(given | {"record.stress": stress})
+            given |= {"record.stress": stress} | ({} if stress else {"limits.rod_stress": "none"})
+            scene = self.scene.with_values(given)
             cases = [{path: rung.values[path] for path in paths} for rung in own.values()]
             title = f"Settings of {scene.name} against each other ({name})"
             found = _needed(self.cases(name, scene, cases, title=title, fidelity=fidelity))

@@ -32,6 +32,8 @@ VERBS = {
     "report": "Write one HTML page about a campaign: outcomes, figures, failures, model.",
     "compare": "Compare two campaigns, or two runs.",
     "replay": "Run one sample of a campaign again.",
+    "calibrate": "Find unknown inputs from measured data.",
+    "sensors": "Tell before a test how much each sensor would tell.",
     "stability": "Map which settings the solver can run, and how other runs end.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",
 }
@@ -39,7 +41,7 @@ VERBS = {
 _FILES = {
     "scene": ("scenes", "check", "explain"),
     "run": ("run",),
-    "studies": ("accuracy", "stability"),
+    "studies": ("accuracy", "stability", "calibrate", "sensors"),
     "campaign": ("campaign", "status", "replay"),
     "results": ("merge", "analyse", "report", "plot", "compare", "export"),
 }

@@ -102,3 +102,13 @@ def write_animation(run: "xr.Dataset", file: Path, colour: str | None) -> None:
     from ringsim.plots.animation import animate
 
     click.echo(f"wrote {animate(run, file, colour or 'lag')}")
+
+
+def draw_learnt(dataset: "xr.Dataset", folder: Path, stem: str, formats: Formats = None) -> None:
+    """Write the figure of a posterior, as the verbs calibrate and plot do."""
+    from ringsim.plots import figures
+    from ringsim.plots.comparison import learnt
+
+    drawn = figures.write_figure(learnt(dataset), folder, f"{stem}-fig-learnt", formats or ("png",))
+    for written in drawn:
+        click.echo(f"wrote {written}")

@@ -114,7 +114,7 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
     """
     loaded = load_scene(scene).with_values(settings)
     if time is not None:
-        from ringsim.calibration import opening_angle_for
+        from ringsim.stowed_angle import opening_angle_for
 
         angle = opening_angle_for(loaded, time)
         click.echo(f"structure.opening_angle = {angle:.6g} deg: the ring deploys in {time:g} s")
@@ -133,7 +133,58 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
         )  # fmt: skip
         for number, line in enumerate(lines):
             click.echo(f"{'' if number else label:<{wide}}{line.replace(_TIED, ' = ')}")
-    click.echo("valid: ringsim run FILE runs it")
+    for line in _doubtful(loaded):
+        click.echo(f"doubtful: {line}")
+    lacking = _lacking(loaded)
+    click.echo(f"valid{lacking}: ringsim run FILE runs it")
+
+
+_TOO_HEAVY = 100.0
+"""Mass of all corners over that of all rods above which a figure of it is taken for a slip."""
+
+
+def _doubtful(scene: Scene) -> Iterator[str]:
+    """Values that are possible and that nobody means, each with why: no reason to refuse a scene,
+    which may be a study of just that.
+    """
+    layout, end = layout_of(scene), scene.solver.end_time
+    shortest = min(rod.length for rod in layout.rods)
+    for plane, cable in () if scene.cables is None else scene.cables.present():
+        path = f"cables.{scene.structure.planes[plane]}"
+        radii = {f"{path}.pulley_radius": cable.pulley_radius}
+        winches = {"winch": cable.winch, "far_winch": cable.far_winch}
+        for name, winch in ((n, w) for n, w in winches.items() if w is not None):
+            radius = getattr(winch.winding, "drum_radius", None)
+            radii |= {} if radius is None else {f"{path}.{name}.winding.drum_radius": radius}
+            for key in ("start_time", "stop_time"):
+                if (time := getattr(winch, key)) is not None and time > end:
+                    yield (
+                        f"{path}.{name}.{key} = {time:g} s is after solver.end_time = {end:g} s: "
+                        "it never happens"
+                    )
+        for where, radius in radii.items():
+            if radius > shortest:
+                yield f"{where} = {radius:g} m is larger than the shortest rod, {shortest:.4g} m"
+    for number, fault in enumerate(scene.faults, 1):
+        if fault.time > end:
+            yield (
+                f"faults[{number}].time = {fault.time:g} s is after solver.end_time = {end:g} s: "
+                "it never happens"
+            )
+    masses, rods = layout.masses(), {rod.group for rod in layout.rods}
+    own = sum(mass for name, mass in masses.items() if name in rods)
+    if masses.get("hinges", 0.0) > _TOO_HEAVY * own:
+        yield (
+            f"structure.corner_mass: corners of {masses['hinges']:.4g} kg on rods of {own:.4g} kg"
+        )
+
+
+def _lacking(scene: Scene) -> str:
+    """What a scene that asks for a drive margin falls short of, in words; empty if of nothing."""
+    if scene.margin is None:
+        return ""
+    least = DriveMargin(substituted(scene), scene.margin).least()
+    return f", but {_verdict(least)} (--margin tells why)" if least.margin < 0.0 else ""
 
 
 def _summary(scene: Scene) -> dict[str, str]:

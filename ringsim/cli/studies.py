@@ -1,7 +1,7 @@
-"""``ringsim accuracy`` and ``stability``."""
+"""``ringsim accuracy``, ``stability``, ``calibrate`` and ``sensors``."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,18 +9,23 @@ import click
 import tomli_w
 
 from ringsim.campaign.panels import Panel, by_engines, panels_over
-from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
-from ringsim.files import write_text
-from ringsim.refusal import EXIT_DONE, EXIT_FAILED
+from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS, draw_learnt
+from ringsim.execution.mpi import launched_size
+from ringsim.files import read_text, write_text
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED
 from ringsim.scene import load_scene
-from ringsim.tables import counted
+from ringsim.tables import Table, counted
+
+_WORKERS = click.option(
+    "--workers", metavar="N", type=WORKERS, help="Solver processes (default: all cores)."
+)
 
 
 @click.command()
 @SCENE
 @SETTINGS
 @click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/accuracy-SCENE).")
-@click.option("--workers", metavar="N", type=WORKERS, help="Solver processes (default: all cores).")
+@_WORKERS
 @click.option(
     "--timeout", metavar="SECONDS", type=click.FloatRange(0.0, min_open=True), default=1800.0,
     show_default=True, help="Time limit for each setting.",
@@ -156,3 +161,71 @@ def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float
     for name in ("stability.nc", "stability.png", "stability.md"):
         click.echo(f"wrote {folder / name}")
     return EXIT_FAILED if (whole["verdict"] == WRONG).any() else EXIT_DONE
+
+
+@click.command()
+@click.argument("file", metavar="FILE", type=PATH)
+@SETTINGS
+@click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME).")
+@_WORKERS
+@click.option("--plot", is_flag=True, help="Draw what was learnt beside posterior.nc.")
+def calibrate_command(
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None, *, plot: bool
+) -> int:
+    """Find unknown inputs from measured data: FILE has priors, the data and a budget of runs.
+
+    FILE is a campaign file without a design, with measured = "TEST.toml", runs and stages.  Writes
+    posterior.nc, from which a campaign draws (inputs.from = "posterior.nc"); each stage is a
+    campaign in the same folder.  The same command goes on with one that was interrupted; under
+    mpiexec or srun every rank computes, and --workers is left out.
+    """
+    from ringsim.analysis.posterior import calibration_tables
+
+    return _course(file, settings, out, workers, calibration_tables, planning=False, plot=plot)
+
+
+@click.command()
+@click.argument("file", metavar="FILE", type=PATH)
+@SETTINGS
+@click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME-sensors).")
+@_WORKERS
+def sensors_command(
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None
+) -> int:
+    """Tell before a test how much each sensor would tell: FILE is as for calibrate.
+
+    The readings need not exist: in the file of measured data clock.interval and clock.end take the
+    place of the table.  Lists the sensors in the order in which they add most, with what is then
+    left of the scatter of each unknown; writes sensors.nc.
+    """
+    from ringsim.analysis.posterior import sensors_table
+
+    return _course(file, settings, out, workers, lambda d: [sensors_table(d)], planning=True)
+
+
+def _course(
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None,
+    tables: Callable[[Any], list[Table]], *, planning: bool, plot: bool = False,
+) -> int:  # fmt: skip
+    import xarray as xr
+
+    from ringsim.campaign.calibration import calibration_of, run_course
+
+    # Under an MPI launcher each rank has one.
+    most = workers or (len(os.sched_getaffinity(0)) if launched_size() == 1 else None)
+    ended, path = run_course(
+        lambda: calibration_of(read_text(file), file, settings), most, out, planning=planning
+    )
+    if ended.refused is not None:
+        if ended.first:
+            raise ended.refused
+        return EXIT_BAD_INPUT
+    if ended.first and ended.code == EXIT_DONE:
+        found = xr.load_dataset(path)
+        for table in tables(found):
+            for line in ["", *table.lines()]:
+                click.echo(line)
+        click.echo(f"wrote {path}")
+        if plot:
+            draw_learnt(found, path.parent, path.stem)
+    return ended.code

@@ -51,6 +51,13 @@ class Points:
         found["V-joints"] = places[np.repeat(self.openings.reshape(-1, 1), 2, axis=1)]
         return {name: ends for name, ends in found.items() if len(ends)}
 
+    def of_body(self, body: int) -> int:
+        """The number of the point at the origin of a body, by the body's number."""
+        return next(
+            number for number, at in enumerate(self.mounts)
+            if isinstance(at, OnBody) and at.body == body and not at.arm.any()
+        )  # fmt: skip
+
     def places(self, layout: Layout, openings: Array | None = None) -> Array:
         """Where they stand in a layout, shape (points, 3), m.
 

@@ -1,6 +1,7 @@
 """What the base carries, and how it turns."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -64,6 +65,11 @@ class BaseReaction(Output):
             "peak_base_torque": peaks[1],
         }
 
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the largest force and the largest torque were."""
+        moments = series.times[np.linalg.norm(series.values, axis=2).argmax(axis=0)]
+        return dict(zip(("peak_base_force", "peak_base_torque"), moments.tolist(), strict=True))
+
 
 class BaseRotation(Output):
     """How the body at the boom's upper end has turned since the start."""
@@ -111,10 +117,11 @@ torque and acceleration to 0.5, 9 and 9 %, with 4 to 0.1, 2 and 8 %, with 2.2 to
 0.9 to 11, 62 and 18 %; exudyn with 2 lacks 34, 73 and 88 % of them."""
 
 
-def unresolved(run: Run) -> str:
-    """What a reason says of shocks that last no longer than steps; empty if none was asked for."""
-    record = run.scene.record
-    locks = run.locks[np.isfinite(run.locks)]
+def unresolved(run: Run, shocks: Mapping[str, float]) -> str:
+    """What a reason says of shocks that last no longer than steps: which numbers of the run, each
+    with its time (s), were at such a lock; empty if none was, or no shocks were asked for.
+    """
+    record, locks = run.scene.record, run.locks[np.isfinite(run.locks)]
     asked = run.scene.stop is not None and (record.reactions or record.accelerations)
     if not asked or not len(locks) or len(run.angles.times) < 2:
         return ""
@@ -122,13 +129,20 @@ def unresolved(run: Run) -> str:
     first = np.clip(np.searchsorted(times, locks) - 1, 0, len(times) - 2)
     last = np.maximum(np.searchsorted(times, locks + 0.25 * period), first + 1)
     longest = [float(np.diff(times[i : k + 1]).max()) for i, k in zip(first, last, strict=True)]
-    k, enough = int(np.argmax(longest)), period / STEPS
-    if longest[k] <= enough:
+    # The rods swing up within a period; of a step that is longer its end tells.
+    ends = np.maximum(times[np.minimum(last, len(times) - 1)], locks + period)
+    enough, off, worst = period / STEPS, set[str](), (0.0, 0.0)
+    for begin, end, step, lock in zip(times[first], ends, longest, locks, strict=True):
+        if step > enough and (own := {n for n, time in shocks.items() if begin <= time <= end}):
+            off, worst = off | own, max(worst, (step, float(lock)))
+    if not off:
         return ""
+    longest_step, at = worst
+    names = ", ".join(name for name in shocks if name in off)
     return (
-        f"; steps of {1e3 * longest[k]:.3g} ms at the lock at {locks[k]:.6g} s are too long for "
-        f"shocks in the rods (period {1e3 * period:.3g} ms), so peaks of base loads and corner "
-        f"accelerations may be too low: {_to(run, enough / longest[k])}"
+        f"; steps of {1e3 * longest_step:.3g} ms at the lock at {at:.6g} s are too long for "
+        f"shocks in the rods (period {1e3 * period:.3g} ms), so {names} may be off: "
+        f"{_to(run, enough / longest_step)}"
     )
 
 
@@ -170,9 +184,10 @@ def _to(run: Run, factor: float) -> str:
     """What makes steps so many times as long; a little less, since not all of them follow."""
     solver = run.scene.solver
     if solver.step_control == "constant":
-        return f"reduce solver.step to {_LESS * solver.step * factor:.2g} s"
+        return f"set solver.step = {_LESS * solver.step * factor:.2g}"
     tolerance = max(_LESS * solver.tolerance * factor**2, LEAST_TOLERANCE)
-    return f"reduce solver.tolerance to {tolerance:.1e}, as steps go with its square root"
+    times = math.sqrt(solver.tolerance / tolerance)
+    return f"set solver.tolerance = {tolerance:.1e} (at most {times:.2g} times the steps)"
 
 
 _LESS = 0.9

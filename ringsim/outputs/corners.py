@@ -50,6 +50,12 @@ class PeakAcceleration(Output):
         rows = in_all_planes(peaks, run.scene.structure.planes)
         return {"peak_acceleration": rows, "peak_acceleration_max": peaks.max()}
 
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the largest acceleration was."""
+        sizes = np.linalg.norm(series.values, axis=3).reshape(len(series.times), -1)
+        largest = np.nanmax(sizes, axis=1)
+        return {"peak_acceleration_max": float(series.times[largest.argmax()])}
+
 
 # Where corners, pins, joints and the hub are.
 

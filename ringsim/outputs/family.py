@@ -325,6 +325,12 @@ class Output:
             values[self.variables[1].name] = np.abs(series.values).max()
         return values
 
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When its numbers were (s) that the shock of a lock may make, by variable; none by
+        default, and of what did not happen.
+        """
+        return {}
+
     def told(self, values: Values, span_names: SpanNames) -> str:
         """When and where the value in its summary was, in words; empty if that is not known."""
         return "" if self.peak is None else self.peak.told(values, span_names)

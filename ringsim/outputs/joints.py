@@ -62,7 +62,8 @@ class Asynchrony(Output):
             error_bar=ErrorBar("asynchrony", safety=5.0),
         ),
         Variable(
-            "asynchrony_max", (), "degree", "largest asynchrony up to the deployment time",
+            "asynchrony_max", (), "degree",
+            "largest asynchrony up to the deployment time, or the run's end without one",
             error_bar=ErrorBar("largest asynchrony", safety=1.8),
             summary=("largest asynchrony", "10.4f"), worse="larger", largest_of="asynchrony",
             round_off=1e-4,  # sections that are all alike run apart by up to 5e-6 deg
@@ -232,6 +233,11 @@ class Latching(Output):
             "latched_joints": caught.sum(),
         }
 
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the joint met its latch that was the slowest."""
+        rates = _rates(run)
+        return _at_lock("least_latch_rate", run, -rates) if np.isfinite(rates).all() else {}
+
 
 class FastestLatch(Output):
     """The largest opening rate at which a V-joint met its latch: the shock of latching grows with
@@ -258,6 +264,17 @@ class FastestLatch(Output):
             run, run.locks, rates
         )
 
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the joint met its latch that was the fastest."""
+        return _at_lock("peak_latch_rate", run, _rates(run))
+
+
+def _at_lock(name: str, run: Run, values: Array) -> dict[str, float]:
+    """When the joint locked that has the largest of values, shape (planes, sections)."""
+    if not np.isfinite(values).any():
+        return {}
+    return {name: float(run.locks.flat[int(np.nanargmax(values))])}
+
 
 def _rates(run: Run) -> Array:
     """Shape (planes, sections), rad/s; NaN where a joint did not come to its latch."""
@@ -280,12 +297,19 @@ def missed(values: Values, planes: Sequence[str]) -> str:
 # The shock of every lock.
 
 
+_AT_REST = 0.01
+"""Share of the rate at a lock below which a V-joint has come to rest in its stop: one that drag
+brakes, or that creeps on, never stops quite."""
+
+
 class LockImpulse(Output):
-    """Angular impulse of the stop on every V-joint while it first holds it: from its lock until the
-    torque ends or turns round.
+    """Angular impulse of the stop on every V-joint in its first contact: from the lock until the
+    joint comes to rest, and as long again, or until the torque ends or turns round before.
 
     A V-joint that meets its stop alone, at the rate w and with the inertia I, takes I w (1 + e), e
-    its coefficient of restitution.
+    its coefficient of restitution: a linear stop with any damping takes as long to throw it back
+    as to halt it.  What presses a latched joint on after that is load, not shock, and grows with
+    the time for which one looks.
     """
 
     rank = 48
@@ -293,7 +317,8 @@ class LockImpulse(Output):
     variables = (
         Variable(
             "lock_impulse", ("plane", "section"), "N m s",
-            "angular impulse of the stop on the V-joint at its lock; missing if it did not lock",
+            "angular impulse of the stop on the V-joint at its lock: until it has come to rest, "
+            "and as long again for its rebound; missing if it did not lock",
         ),
         Variable(
             "peak_lock_impulse", (), "N m s",
@@ -309,16 +334,29 @@ class LockImpulse(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Trapezoids over the steps, which resolve a bounce."""
-        found = np.full(run.locks.shape, np.nan)
-        for place in np.argwhere(np.isfinite(run.locks)):
-            where = tuple(place)
-            found[where] = first_impulse(series.times, series.values[:, *where], run.locks[where])
+        found = _impulses(run, series)
         peak = np.fmax.reduce(found, axis=None)  # without a lock NaN
         return {"lock_impulse": found, "peak_lock_impulse": peak}
 
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the joint locked that took most."""
+        return _at_lock("peak_lock_impulse", run, _impulses(run, series))
 
-def first_impulse(times: Array, torques: Array, lock: float) -> float:
-    """Impulse (N m s) of the first contact after a lock (s), of torques (N m) at times (s)."""
+
+def _impulses(run: Run, series: Series) -> Array:
+    """Shape (planes, sections), N m s; NaN where a joint did not lock."""
+    found = np.full(run.locks.shape, np.nan)
+    for place in np.argwhere(np.isfinite(run.locks)):
+        where = tuple(place)
+        torques, rates = (each.values[:, *where] for each in (series, run.rates))
+        found[where] = first_impulse(series.times, torques, rates, run.locks[where])
+    return found
+
+
+def first_impulse(times: Array, torques: Array, rates: Array, lock: float) -> float:
+    """Impulse (N m s) of the first contact after a lock (s), of torques (N m) and opening rates
+    (rad/s) at times (s); see ``LockImpulse``.
+    """
     begun = max(int(np.searchsorted(times, lock)) - 1, 0)
     pushed = np.flatnonzero(torques[begun:]) + begun
     if not len(pushed):
@@ -329,10 +367,25 @@ def first_impulse(times: Array, torques: Array, lock: float) -> float:
     # The contact begins at the lock and ends between two steps.
     held = slice(first, last)
     own = np.concatenate([[min(lock, times[first])], times[held], times[last : last + 1]])
+    torque = np.concatenate([[0.0], torques[held], np.zeros(len(times[last : last + 1]))])
+    end = min(2.0 * _rest(times, rates, begun, lock) - lock, float(own[-1]))
+    inside = own < end
+    torque = np.append(torque[inside], np.interp(end, own, torque))
     from scipy.integrate import trapezoid  # here: only scenes that record reactions need it
 
-    ends = np.zeros(1 + len(times[last : last + 1]))
-    return float(abs(trapezoid(np.concatenate([ends[:1], torques[held], ends[1:]]), own)))
+    return float(abs(trapezoid(torque, np.append(own[inside], end))))
+
+
+def _rest(times: Array, rates: Array, begun: int, lock: float) -> float:
+    """When a V-joint that locks in the step behind ``begun`` comes to rest, s; infinite if not."""
+    enough = _AT_REST * rates[begun]
+    there = np.flatnonzero(rates[begun + 1 :] <= enough) + begun + 1
+    if not len(there):
+        return math.inf
+    k = int(there[0])
+    before = (lock, rates[begun]) if k == begun + 1 else (times[k - 1], rates[k - 1])
+    part = (before[1] - enough) / max(before[1] - rates[k], 1e-300)
+    return float(before[0] + min(part, 1.0) * (times[k] - before[0]))
 
 
 # How well the joints hold together.

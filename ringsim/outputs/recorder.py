@@ -162,7 +162,11 @@ class Recorder(Remembering):
         passed = overloads(self._scene, self.readings, series_of)
         loose = slackened(self._scene, values)
         found = ended(self.status, self.fate, self.reason, passed, loose, coordinates, values)
-        told = "" if self.status.failed else unresolved(run) + jerked(run)
+        shocks = dict[str, float]()
+        for output in self.readings:
+            if (series := series_of(output)) is not None:
+                shocks |= output.shocks(run, series)
+        told = "" if self.status.failed else unresolved(run, shocks) + jerked(run)
         return replace(found, reason=found.reason + told)
 
 

@@ -50,6 +50,11 @@ class RodStress(Output):
         values, peak = super().reduce(run, series), PEAK.of(run, series.times, series.values)
         return values | peak | {"peak_rod_stress": np.nanmax(series.values)}
 
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the largest stress was."""
+        largest = np.nanmax(series.values.reshape(len(series.times), -1), axis=1)
+        return {"peak_rod_stress": float(series.times[largest.argmax()])}
+
 
 # Bending strain of the rod that carries a structure's gauge.
 

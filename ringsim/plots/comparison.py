@@ -13,13 +13,23 @@ from ringsim.analysis.comparison_text import differing, names_of
 from ringsim.analysis.courses import deployed, names_of_ends
 from ringsim.analysis.design import blocks, endings, population_of, scalars, values_of
 from ringsim.analysis.intervals import good, numbers, tells_of, used
+from ringsim.analysis.posterior import UNEXPLAINED
 from ringsim.analysis.residuals import Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import base_of, legend, limits, of_cases
+from ringsim.plots.campaign.frame import (
+    APART,
+    at_or_below,
+    base_of,
+    legend,
+    limits,
+    of_cases,
+    shown_until,
+)
 from ringsim.tables import (
     estimate_text,
     interval_text,
+    number_text,
     readable,
     unit_behind,
     unit_text,
@@ -59,18 +69,38 @@ def _figures(
     both = population_of(first), population_of(second)
     if "sample" in first.dims:
         known = [set(scalars(each)) for each in both]
-        names = [n for n in differing(found) if all(n in each for each in known)]
+        every = [n for n in differing(found) if all(n in each for each in known)]
+        names = [n for n in every if not _still(both, n)] or every
+        unmoved = [n for n in every if n not in names]
         if names and found.attrs["pairs"]:
             words = "How far the samples of each pair differ"
-            yield "differences", words, pairs(found, both, names)
+            yield "differences", words, _noted(pairs(found, both, names), unmoved)
         if names:
-            yield "values", "Distribution of each main number in both", values(found, both, names)
+            words = "Distribution of each main number in both"
+            yield "values", words, _noted(values(found, both, names), unmoved)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
-    until = max(_last(each) for each in both)
+    until = _until(both)
     drawn = {name: [_course(each, name, until) for each in both] for name in names}
     read = {n: rows for n, rows in drawn.items() if all(np.isfinite(r).any() for _, r in rows)}
     if read:
         yield "courses", "Courses over time in both", courses(found, both, read)
+
+
+def _still(both: Both, name: str) -> bool:
+    """Whether all values of both are the same to a thousandth, and nothing is required of them."""
+    every = np.concatenate([values_of(each, name)[1] for each in both])
+    wanted = any(limits(each, name) for each in both)
+    return bool(every.size) and not wanted and np.ptp(every) < APART * np.abs(every).max()
+
+
+def _noted(figure: Figure, unmoved: list[str]) -> Figure:
+    """A figure that says below its panels which numbers have none."""
+    if unmoved:
+        words = f"Not drawn, because samples differ by less than {100 * APART:g} %: "
+        words = textwrap.fill(words + ", ".join(unmoved), int(12.0 * figure.get_figwidth()))
+        figure.legends[0].set_title(words)
+        figure.legends[0].get_title().set_fontsize(9)
+    return figure
 
 
 @style.styled
@@ -129,10 +159,8 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
         counts = []
         for each, called, (colour, dashes) in zip(both, names_of(found), _LOOKS, strict=True):
-            ordered = np.sort(values_of(each, name)[1])
-            of = int(tells_of(each, name).sum())
-            counts.append(f"{len(ordered)} of {of}")
-            share = np.arange(len(ordered) + 1) / of
+            ordered, share = at_or_below(each, name)
+            counts.append(f"{len(ordered)} of {int(tells_of(each, name).sum())}")
             axes.step(np.append(ordered[:1], ordered), share, where="post", color=colour,
                       linestyle=dashes, label=called)  # fmt: skip
         wanted = dict.fromkeys(limit for each in both for limit in limits(each, name))
@@ -180,12 +208,17 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         if name != "opening_angle":
             style.span_sizes(axes, np.concatenate([each.ravel() for each in drawn]))
     grid[-1].set_xlabel(style.label(both[0]["time"]))
-    grid[0].set_xlim(0.0, max(_last(each) for each in both))
+    grid[0].set_xlim(0.0, _until(both))
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
     if not single:
         told = dict.fromkeys(_BANDS_OF[of_cases(each)] for each in both)
-        figure.legends[0].set_title("\n".join([*told, _OVER]))
+        cut = [
+            f"{called}: {ran_on.partition(': ')[2]}"
+            for each, called in zip(both, names_of(found), strict=True)
+            if (ran_on := shown_until(each)[1]) and _last(each) > _until(both)
+        ]  # fmt: skip
+        figure.legends[0].set_title("\n".join([*told, _OVER, *cut]))
         figure.legends[0].get_title().set_fontsize(9)
     return figure
 
@@ -201,6 +234,14 @@ _OVER = (
 )
 _DEPLOYED = {"opening_angle": 180.0, "asynchrony": 0.0}
 """What a deployed ring has: its last record may be before its last lock."""
+
+
+def _until(both: Both) -> float:
+    """Time up to which courses of both are drawn, s."""
+    return max(
+        min(_last(each), shown_until(each)[0]) if "sample" in each.dims else _last(each)
+        for each in both
+    )
 
 
 def _last(dataset: xr.Dataset) -> float:
@@ -295,4 +336,48 @@ def measured_and_computed(found: list[Residuals], title: str) -> Figure:
     more = f" ({left_out} sensors that fit better are not drawn)" * bool(left_out)
     style.title(figure, f"Measured and computed: {title}{more}")
     style.in_readable_units(figure)
+    return figure
+
+
+_BAND = 1.6449
+"""Half of what holds 90 % of a normal variable, in sigmas."""
+
+
+@style.styled
+def learnt(posterior: xr.Dataset) -> Figure:
+    """What a calibration has found: on the left each unknown before the data (grey, 90 %) and after
+    them, in sigmas of the prior, with its median; on the right how far each sensor is off.
+    """
+    unknowns, sensors = posterior.sizes["unknown"], posterior.sizes["sensor"]
+    figure = Figure(figsize=(12.0, max(0.42 * unknowns, 0.24 * sensors, 2.0) + 1.6))
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+    names = []
+    for k in range(unknowns):
+        one = posterior.isel(unknown=k)
+        quantiles = one["posterior_quantile"].values
+        factor, units = readable(str(one["unknown_units"].item()), float(np.abs(quantiles).max()))
+        half = _BAND * float(one["learnt"])
+        left.barh(k, 2.0 * _BAND, left=-_BAND, height=0.62, color=style.GREY, alpha=0.3)
+        left.errorbar(float(one["shift"]), k, xerr=half, fmt="o", color=style.BLUE, markersize=5,
+                      capsize=3, linewidth=1.8)  # fmt: skip
+        told = f"{number_text(factor * quantiles[1], 4)} {unit_text(units)}".rstrip()
+        names.append(f"{one['unknown'].item()}\n{told}")
+    left.set_yticks(range(unknowns), names)
+    shifts, halves = posterior["shift"].values, _BAND * posterior["learnt"].values
+    ends = np.concatenate([shifts - halves, shifts + halves, [-_BAND, _BAND]])
+    left.set_xlim(1.05 * ends.min(), 1.05 * ends.max())
+    left.set_xlabel("Sigmas of the prior from its median")
+    left.set_title("Unknowns before (grey) and after the data: 90 %, median", fontsize=10)
+    far = posterior["chance"].values < UNEXPLAINED
+    right.axvline(1.0, color=style.GREY, linewidth=0.9)
+    right.scatter(posterior["rms_in_deviations"], range(sensors), s=22, zorder=3,
+                  color=np.where(far, style.VERMILLION, style.BLUE))  # fmt: skip
+    right.set_yticks(range(sensors), [str(name) for name in posterior["sensor"].values])
+    right.set_xlim(0.0, 1.08 * max(1.2, float(posterior["rms_in_deviations"].max())))
+    right.set_xlabel("rms of misfits (1: scatter alone)")
+    right.set_title("Sensors" + ", in red those not explained" * bool(far.any()), fontsize=10)
+    for axes, count in ((left, unknowns), (right, sensors)):
+        axes.set_ylim(count - 0.4, -0.6)
+        axes.tick_params(axis="y", labelsize=8.5, length=0)
+    style.title(figure, f"Learnt from the test: {posterior.attrs['title']}")
     return figure

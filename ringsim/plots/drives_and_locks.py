@@ -8,13 +8,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from ringsim.analysis.design import inputs, paths_of
 from ringsim.choice import kind_of
-from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
+from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.registry import picture
-from ringsim.scene import scene_from_toml
+from ringsim.scene import Scene, scene_from_toml
 
 _SOURCES = (
     style.SKY, style.ORANGE, style.GREEN, style.VERMILLION, style.PURPLE, style.BLUE, style.GREY,
@@ -67,9 +68,7 @@ def drive(dataset: xr.Dataset) -> Figure:
         told = [f"least margin {least:.3f} at {where:.0f} deg"]
     if (known["time"] >= stopped).any():
         told.append(f"no margin from {stopped:.4g} s on: the {winch} has stopped")
-    style.free(lower.text(
-        0.98, 0.95, "\n".join(told), ha="right", va="top", transform=lower.transAxes,
-    ))  # fmt: skip
+    lower.set_title("; ".join(told), fontsize=9.5)  # inside it would lie on the curve
     style.margin_axis(lower, margin, f"Margin by {standard_of(dataset)}")
     lower.set_xlabel("Mean opening angle (deg)")
     style.head(figure, upper, dataset, "Drive and resistance")
@@ -83,18 +82,39 @@ def standard_of(dataset: xr.Dataset) -> str:
 
 
 def first_stop(dataset: xr.Dataset) -> tuple[float, str]:
-    """When the first of a scene's winches is switched off (s), and its name; infinity if none is.
+    """When the first of a run's winches is switched off (s), and its name; infinity if none is."""
+    ends = {name: float(time) for name, time in stop_times(dataset).items()}
+    return min(((time, name) for name, time in ends.items()), default=(np.inf, ""))
 
-    Of winches that turn at all, and not of those that stop because their plane has locked.
+
+def stop_times(dataset: xr.Dataset) -> dict[str, Array]:
+    """When each winch is switched off, s, by its name: () of a run, (sample,) of a campaign;
+    infinity if it is not.
+
+    From then on it holds its rope, which lets its plane open no further: the drive has no margin
+    any more.  Of winches that turn at all, and not of those that stop because their plane has
+    locked.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    stops = [
-        (winch.stop_time, f"{end} of the {scene.structure.planes[plane]} cable")
-        for plane, cable in ([] if scene.cables is None else scene.cables.present())
-        for end, winch in zip(("winch", "far winch"), cable.winches, strict=False)
-        if winch.stop_time is not None and winch.stop_time != winch.start_time
-    ]
-    return min(stops, default=(np.inf, ""))
+    drawn = {path: dataset[name].to_numpy() for name in inputs(dataset)
+             for path in paths_of(dataset[name]) if path.endswith("_time")}  # fmt: skip
+    found = {}
+    for plane, cable in [] if scene.cables is None else scene.cables.present():
+        called = scene.structure.planes[plane]
+        for end, winch in zip(("winch", "far winch"), cable.winches, strict=False):
+            own = "winch" if cable.far_winch is None else end.replace(" ", "_")
+            path = f"cables.{called}.{own}"
+            begin, stop = (
+                _seconds(drawn.get(f"{path}.{name}", np.array(str(getattr(winch, name)).lower())))
+                for name in ("start_time", "stop_time")
+            )
+            found[f"{end} of the {called} cable"] = np.where(stop == begin, np.inf, stop)
+    return found
+
+
+def _seconds(values: Array) -> Array:
+    """Times that may be "none"."""
+    return np.where(values.astype(str) == "none", "inf", values.astype(str)).astype(float)
 
 
 _MOTOR = ("motor_current", "motor_torque", "motor_speed", "motor_power")
@@ -132,30 +152,43 @@ def motors(dataset: xr.Dataset) -> Figure:
 
 
 def _moves(dataset: xr.Dataset) -> bool:
+    if "base_rotation" not in dataset:
+        return False
     return style.largest_magnitude(dataset["base_rotation"]) > _STILL
 
 
 _STILL = 1e-6
 """Turn of a base that is none, degree."""
+_LOADS = ("base_force", "base_torque")
 
 
-@picture("run", 118, "Attitude and place of the spacecraft", ("base_rotation",), _moves)
+def _based(dataset: xr.Dataset) -> bool:
+    return _moves(dataset) or bool(_loads(dataset))
+
+
+def _loads(dataset: xr.Dataset) -> list[xr.DataArray]:
+    return [dataset[name] for name in _LOADS
+            if name in dataset and np.isfinite(dataset[name]).any()]  # fmt: skip
+
+
+@picture("run", 118, "Attitude and place of the base, force and torque on it", applies=_based)
 def base(dataset: xr.Dataset) -> Figure:
-    """``base_rotation`` (axis, time) and, where positions are recorded, how far the boom's upper
-    end has moved since the start; a line an axis.
+    """Of a base that moves ``base_rotation`` (axis, time) and, where positions are recorded, how
+    far the boom's upper end has moved since the start; ``base_force`` and ``base_torque`` where
+    they are recorded.  A line an axis.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    shown = [dataset["base_rotation"].assign_attrs(long_name="rotation vector since the start")]
-    if "position" in dataset:
-        layout = layout_of(scene)
-        points = points_of(layout, scene.structure.planes)
-        name = next(
-            name for name, at in zip(points.names, points.mounts, strict=True)
-            if isinstance(at, OnBody) and at.body == layout.base and not at.arm.any()
-        )  # fmt: skip
-        place = dataset["position"].sel(point=name)
-        words = "way of the boom's upper end since the start"
-        shown.append((place - place.isel(time=0)).assign_attrs(units="m", long_name=words))
+    shown, told, body = [], list[str](), "base"
+    if _moves(dataset):
+        words = "rotation vector since the start"
+        shown, told = [dataset["base_rotation"].assign_attrs(long_name=words)], ["attitude"]
+        body = "spacecraft" if scene.spacecraft is not None else "free base"
+        if "position" in dataset:
+            shown.append(_way(dataset, scene))
+            told.append("place")
+    loads = _loads(dataset)
+    shown += loads
+    told += [str(each.name).removeprefix("base_") for each in loads]
     figure = Figure(figsize=(8.4, 2.5 * len(shown) + 1.3))
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axes, values in zip(panels, shown, strict=True):
@@ -166,11 +199,21 @@ def base(dataset: xr.Dataset) -> Figure:
         axes.set_ylabel(style.label(values, width=30), fontsize=9)
         axes.margins(y=0.12)
     figure.align_ylabels(panels)
-    style.time_axes(dataset, dataset["base_rotation"], *panels)
+    style.time_axes(dataset, shown[0], *panels)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    body = "spacecraft" if scene.spacecraft is not None else "free base"
-    style.head(figure, panels[0], dataset, f"Attitude and place of the {body}")
+    subject = " and ".join(filter(None, [", ".join(told[:-1]), told[-1]]))
+    style.head(figure, panels[0], dataset, f"{subject.capitalize()} of the {body}")
     return figure
+
+
+def _way(dataset: xr.Dataset, scene: Scene) -> xr.DataArray:
+    """How far the boom's upper end has moved since the start, (axis, time), m."""
+    layout = layout_of(scene)
+    assert layout.base is not None
+    points = points_of(layout, scene.structure.planes)
+    place = dataset["position"].sel(point=points.names[points.of_body(layout.base)])
+    words = "way of the boom's upper end since the start"
+    return (place - place.isel(time=0)).assign_attrs(units="m", long_name=words)
 
 
 _LINES = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE)
@@ -199,7 +242,7 @@ def locks(dataset: xr.Dataset) -> Figure:
         axes.set_ylabel(style.label(about, width=20), fontsize=9)
         axes.margins(y=0.15)
         if name != "lock_time":
-            axes.set_ylim(bottom=0.0)
+            style.from_zero(axes)
     entries = [
         Line2D([], [], linestyle="none", marker=marker, color=colour, label=f"{plane} plane")
         for plane, (marker, colour) in zip(planes, _MARKS, strict=False)

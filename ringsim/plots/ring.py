@@ -13,14 +13,16 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 from scipy.constants import kilogram_force
+from scipy.spatial.transform import Rotation
 
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
 from ringsim.plots import style
-from ringsim.plots.peaks import Peak, peak_of
 from ringsim.plots.registry import jointed, picture
+from ringsim.plots.run import Peak, peak_of
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import Shape, Track, places_at, shape_of
+from ringsim.tables import unit_text
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,8 @@ _ELEVATION = 24.0
 _WIDTH, _HIGHEST, _SIDE, _GAP = 10.6, 4.6, 0.3, 0.35
 _BELOW, _ABOVE, _BAR, _CAPTION = 1.2, 1.12, 0.46, 2.4
 """Room on the sheet, in inch: the drawing; beside, below and above it; a caption's width."""
+_MOST_ENTRIES, _ROW = 7, 0.22
+"""Of a row of the legend; its height in inch."""
 _FADE = 0.6
 """Share of white in the farthest line."""
 _POINT = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
@@ -37,6 +41,8 @@ LOOKS: dict[str, dict[str, Any]] = {
     "bars": {"color": style.VERMILLION, "linewidth": 1.5, "label": "folding bars"},
     "hinge assemblies": {"color": style.INK, "linewidth": 3.0},
     "boom": {"color": style.GREY, "linewidth": 5.0},
+    "spacecraft": {"color": style.PURPLE, "linewidth": 11.0, "marker": "o"},
+    "from the boom's upper end to it": {"color": style.PURPLE, "linewidth": 2.0},
     "V-joints, locked": {"color": style.INK, "linewidth": 5.0, "marker": "o"},
     "V-joints, free": {"color": style.ORANGE, "linewidth": 5.0, "marker": "o"},
     "net, taut": {"color": style.GREEN, "linewidth": 0.9},
@@ -59,18 +65,28 @@ def ring(dataset: xr.Dataset, states: int = 3) -> Figure:
     azimuth = facing_azimuth(scene)
     moments = instants(dataset, states)
     shape = shape_of(dataset, scene)
-    shots = [_shot(shape, angles, _locked(dataset, angles), azimuth) for _, angles in moments]
+    shots = [
+        _shot(shape, angles, _locked(dataset, angles), azimuth, _turn(dataset, angles))
+        for _, angles in moments
+    ]
+    drawn = {name for names, _, _ in shots for name in names}
+    known = LOOKS | dict.fromkeys(sorted(drawn - LOOKS.keys()), OTHER)
+    looks = [{"label": name} | look for name, look in known.items() if name in drawn]
+    looks = [look | {"linestyle": "none"} if "marker" in look else look for look in looks]
+    entries = [Line2D([], [], **look) for look in looks]
+    rows = -(-len(entries) // _MOST_ENTRIES)
+    below = _BELOW + _ROW * (rows - 1)
     low = np.array([lines.min(axis=(0, 1)) for _, lines, _ in shots])
     sizes = np.array([lines.max(axis=(0, 1)) for _, lines, _ in shots]) - low
     height = float(sizes[:, 1].max())
     scale, cells = _fit(sizes[:, 0], height)
     subject = "Deployment as computed" if shape.computed else "Deployment"
-    wide, high = _WIDTH + 2 * _SIDE, _BELOW + height * scale + _ABOVE
+    wide, high = _WIDTH + 2 * _SIDE, below + height * scale + _ABOVE
     high += style.further_lines(dataset, subject, wide)
     figure = Figure(figsize=(wide, high))
     figure.set_layout_engine("none")
     # Axes in metre whose frame is the drawing, between room for words above and below.
-    axes = figure.add_axes((_SIDE / wide, _BELOW / high, _WIDTH / wide, height * scale / high))
+    axes = figure.add_axes((_SIDE / wide, below / high, _WIDTH / wide, height * scale / high))
     axes.set_axis_off()
     axes.set(aspect="equal", xlim=(0.0, _WIDTH / scale), ylim=(0.0, height))
     middles = (np.cumsum(cells + _GAP) - 0.5 * cells - _GAP) / scale
@@ -79,12 +95,7 @@ def ring(dataset: xr.Dataset, states: int = 3) -> Figure:
         _draw(axes, names, lines + (lefts - low)[number], near, scale)
         _caption(axes, middles[number], *moments[number])
     _scale_bar(axes, _WIDTH / scale, height)
-    drawn = {name for names, _, _ in shots for name in names}
-    known = LOOKS | dict.fromkeys(sorted(drawn - LOOKS.keys()), OTHER)
-    looks = [{"label": name} | look for name, look in known.items() if name in drawn]
-    looks = [look | {"linestyle": "none"} if "marker" in look else look for look in looks]
-    entries = [Line2D([], [], **look) for look in looks]
-    figure.legend(handles=entries, loc="lower center", ncols=len(entries))
+    figure.legend(handles=entries, loc="lower center", ncols=-(-len(entries) // rows))
     style.head(figure, axes, dataset, subject, pad=72.0 * _BAR)
     return figure
 
@@ -160,6 +171,15 @@ def _locked(dataset: xr.Dataset, angles: xr.DataArray) -> NDArray[np.bool_]:
     return np.asarray(locks <= float(angles["time"]))
 
 
+def _turn(dataset: xr.Dataset, angles: xr.DataArray) -> Array:
+    """How the base has turned by the time of some angles: a rotation vector, rad."""
+    if "base_rotation" not in dataset or not np.isfinite(dataset["base_rotation"]).any():
+        return np.zeros(3)
+    known = dataset["base_rotation"].transpose("time", "axis").dropna("time")
+    rows, times = np.radians(known.values), known["time"].values
+    return np.array([np.interp(float(angles["time"]), times, row) for row in rows.T])
+
+
 def _fit(widths: Array, height: float) -> tuple[float, Array]:
     """Scale (inch a metre) and widths of the columns (inch): each holds its caption too."""
     room = _WIDTH - _GAP * (len(widths) - 1)
@@ -179,7 +199,7 @@ def _caption(axes: Axes, middle: float, name: str, angles: xr.DataArray) -> None
     time = angles["time"]
     numbers = (
         f"{float(time):.2f} {time.attrs['units']}\n"
-        f"mean opening angle {float(angles.mean()):.1f} {angles.attrs['units']}"
+        f"mean opening angle {float(angles.mean()):.1f} {unit_text(angles.attrs['units'])}"
     )
     for text, drop, weight in ((name, 12, "bold"), (numbers, 28, "normal")):
         axes.annotate(
@@ -189,14 +209,15 @@ def _caption(axes: Axes, middle: float, name: str, angles: xr.DataArray) -> None
 
 
 def _shot(
-    shape: Shape, angles: xr.DataArray, locked: NDArray[np.bool_], azimuth: float
+    shape: Shape, angles: xr.DataArray, locked: NDArray[np.bool_], azimuth: float, turn: Array
 ) -> tuple[list[str], Array, Array]:
     """Parts, ends on the paper and nearness of all lines at one instant, the farthest first."""
     openings = np.radians(angles.transpose("plane", "section").values)
-    parts = (
-        shape.lines(shape.at(float(angles["time"]))) if shape.computed
-        else lines_at(shape.scene, openings)
+    places = (
+        shape.at(float(angles["time"])) if shape.computed
+        else places_at(shape.scene, shape.points, openings)
     )  # fmt: skip
+    parts = shape.lines(places) | _spacecraft(shape, places, turn)
     joints = parts.pop("V-joints") + _POINT
     for name, own in (("V-joints, locked", locked.ravel()), ("V-joints, free", ~locked.ravel())):
         parts |= {name: joints[own]} if own.any() else {}
@@ -207,6 +228,23 @@ def _shot(
     near += [1e-6 * name.startswith("V-joints") for name in names]
     order = np.argsort(near, kind="stable")
     return [names[k] for k in order], lines[order], near[order]
+
+
+def _spacecraft(shape: Shape, places: Array, turn: Array) -> dict[str, Array]:
+    """Where the spacecraft's centre of mass is, as a point, and the line that leads to it from the
+    boom's upper end, which it is fixed to.
+
+    Only what is drawn as computed has turned with its base by the rotation vector ``turn``, rad.
+    """
+    craft, base = shape.scene.spacecraft, layout_of(shape.scene).base
+    if craft is None or base is None:
+        return {}
+    top, turned = places[shape.points.of_body(base)], turn * shape.computed
+    centre = top + Rotation.from_rotvec(turned).apply(np.array(craft.centre))
+    found = {"spacecraft": (centre + _POINT)[None]}
+    if any(craft.centre):
+        found["from the boom's upper end to it"] = np.array([[top, centre]])
+    return found
 
 
 def _draw(axes: Axes, names: list[str], lines: Array, near: Array, scale: float) -> None:

@@ -17,8 +17,8 @@ from ringsim.cable.records import Cable
 from ringsim.layout.bodies import JointOpening, OnRod
 from ringsim.layout.layout import layout_of
 from ringsim.plots import style
-from ringsim.plots.peaks import mark, peak_of
 from ringsim.plots.registry import barred, jointed, picture
+from ringsim.plots.run import mark, peak_of
 from ringsim.scene import Scene, scene_from_toml
 
 _LOOKS: tuple[tuple[str, Any], ...] = (
@@ -335,8 +335,12 @@ def cables(dataset: xr.Dataset) -> Figure:
 
 
 _SECTIONS = 4
-_LINES = ((style.BLUE, "-"), (style.ORANGE, "-"), (style.GREEN, (0, (5, 3))))
-"""Both hinge pulleys of a section between others are alike."""
+_LINES: tuple[dict[str, Any], ...] = (
+    {"color": style.SKY, "linewidth": 3.6},
+    {"color": style.ORANGE, "linewidth": 1.5},
+    {"color": style.INK, "linewidth": 1.2, "linestyle": (0, (4, 3))},
+)
+"""Both hinge pulleys of a section between others are alike: one is seen beside the other."""
 
 
 @picture("run", 70, "What the pulleys pass on", ("pulley_ratio", "opening_angle"), barred)
@@ -353,11 +357,10 @@ def pulleys(dataset: xr.Dataset) -> Figure:
     for column, plane in zip(grid.T, planes, strict=True):
         own = ratio.sel(plane=plane).transpose("pulley", "time").values
         for axes, section in zip(column, shown, strict=True):
-            for node, (colour, dash), row in zip(NODES, _LINES, own[3 * section :], strict=False):
-                line = {"color": colour, "linestyle": dash, "label": f"{node} pulley"}
-                axes.plot(dataset["time"], row, linewidth=1.5, **line)
+            for node, look, row in zip(NODES, _LINES, own[3 * section :], strict=False):
+                axes.plot(dataset["time"], row, label=f"{node} pulley", **look)
             style.name_panel(axes, f"{plane} cable, section {section + 1} from the winch")
-    known = own[np.isfinite(own)]
+    known = ratio.values[np.isfinite(ratio.values)]
     for axes in grid[:, 0]:
         axes.set_ylabel("Tension behind\nover before")
     low = float(known.min()) if known.size else 0.0

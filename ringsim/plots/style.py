@@ -146,7 +146,7 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-_FIXED = "\u00a0"
+FIXED = "\u00a0"
 """A blank at which no line is broken."""
 
 
@@ -163,8 +163,8 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     words = str(variable.attrs.get("long_name", variable.name))
     units = str(variable.attrs.get("units", "1")) if units is None else units
     words = words[:1].upper() + words[1:]
-    held = unit_behind(words, units.replace(" ", _FIXED))
-    return textwrap.fill(held, width).replace(_FIXED, " ")
+    held = unit_behind(words, units.replace(" ", FIXED))
+    return textwrap.fill(held, width).replace(FIXED, " ")
 
 
 def unit_label(variable: xr.DataArray) -> str:
@@ -186,17 +186,25 @@ def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
 
 
 def in_readable_units(figure: Figure) -> None:
-    """Let the axes and words of a figure of SI values give stress as people read it."""
+    """Let the axes and words of a figure of SI values give stress as people read it.
+
+    An axis of stress is one that its label names so, or the figure's for all axes, or, where the
+    vertical axis has no label, the title of its panel.
+    """
+    told = ""
     for axes, side in product(figure.axes, ("x", "y")):
         axis: Axis = getattr(axes, f"{side}axis")
-        beside = getattr(figure, f"get_sup{side}label")()
-        if _PASCAL in axis.get_label_text() or _PASCAL in beside:
+        words = axis.get_label_text() + getattr(figure, f"get_sup{side}label")()
+        if side == "y" and not words:
+            words = axes.get_title("left") + axes.get_title("center") + axes.get_title("right")
+        if _PASCAL in words:
             factor, units = readable("Pa", max(map(abs, axis.get_view_interval())))
             axis.set_major_formatter(FuncFormatter(partial(_scaled, factor)))
             axis.set_minor_formatter(NullFormatter())
-            axis.set_label_text(axis.get_label_text().replace(_PASCAL, f"({units})"))
-    for text in figure.findobj(Text):
-        text.set_text(text.get_text().replace(_PASCAL, "(MPa)"))
+            told = f"({units})"
+            axis.set_label_text(axis.get_label_text().replace(_PASCAL, told))
+    for text in figure.findobj(Text) if told else ():
+        text.set_text(text.get_text().replace(_PASCAL, told))
 
 
 _PASCAL = "(Pa)"
@@ -272,7 +280,10 @@ def heading(dataset: xr.Dataset, subject: str, inches: float) -> tuple[str, str]
     lines = len(textwrap.wrap(words, width))
     # The narrowest text with as few lines: all are about equally long.
     fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
-    end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
+    told, wide = ending(dataset), int(11.5 * inches)
+    while len(textwrap.wrap(told, wide)) > 2 and "; " in told:
+        told = told.rpartition("; ")[0]  # what follows from it, which tables tell
+    end = textwrap.wrap(told, wide, max_lines=2, placeholder=" ...")
     return textwrap.fill(words, next(fitting, width)), "\n".join(end)
 
 
@@ -385,6 +396,11 @@ def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
     axes.set_yscale("log", nonpositive="clip")
     axes.set_ylim(10.0 ** np.floor(np.log10(lowest)), 4.0 * largest)
     plain_numbers(axes.yaxis)
+
+
+def from_zero(axes: Axes) -> None:
+    """Value axis from zero with room above for whole markers, however alike the values are."""
+    axes.set_ylim(0.0, 1.08 * axes.get_ylim()[1])
 
 
 def signed_sizes(axes: Axes, sizes: np.ndarray) -> None:

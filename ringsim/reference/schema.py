@@ -36,6 +36,16 @@ def schema_of(kind: str) -> dict[str, Any]:
         nested = {"type": "object", "additionalProperties": {"$ref": "#/$defs/Inputs"}}
         made["$defs"]["Inputs"] = {"anyOf": [one, nested]}
         inputs["additionalProperties"] = {"$ref": "#/$defs/Inputs"}
+        learnt = {
+            "type": "object",
+            "required": ["file"],
+            "additionalProperties": False,
+            "properties": {
+                "file": {"type": "string"},
+                "without": {"type": "array", "items": {"type": "string"}},
+            },
+        }
+        inputs["properties"] = {"from": {"anyOf": [{"type": "string"}, learnt]}}
     return {"$schema": DIALECT, **made, "title": f"{kind} file of ringsim"}
 
 

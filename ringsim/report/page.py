@@ -5,15 +5,24 @@ import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import xarray as xr
 
 from ringsim.analysis import comparison_text
 from ringsim.analysis.campaign_notes import override_lines, peak_lines, restart_lines
-from ringsim.analysis.design import campaign_file, endings, inputs, paths_of
+from ringsim.analysis.design import (
+    NOT_RUN,
+    REACHED,
+    UNKNOWN,
+    campaign_file,
+    endings,
+    inputs,
+    paths_of,
+)
 from ringsim.analysis.intervals import good
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import head_lines, outputs_in, sections
-from ringsim.analysis.worst import note_on_unusual
+from ringsim.analysis.worst import note_on_unusual, worst_tables
 from ringsim.files import write_text
 from ringsim.overrides import flat
 from ringsim.plots.comparison import figures_of_both
@@ -120,7 +129,12 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     """
     analysis = analyse(campaign) if analysis is None else analysis
     wanted = campaign_file(campaign)
-    failures, more = tables.failures(campaign, folder)
+    found = dict[int, list[str]]()
+    for table in worst_tables(analysis, folder):
+        for sample, what, *_ in table.rows:
+            found.setdefault(int(sample), []).append(what.removeprefix("no value: "))
+    failures, more = tables.failures(campaign, folder, found)
+    short = ~np.isin(endings(campaign), (*REACHED, UNKNOWN, NOT_RUN))
     shown = player(campaign, analysis)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = values_of(campaign)
@@ -142,6 +156,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign),
         "first": _FIRST, "player": shown, "failures": failures, "more": more,
+        "short": bool(short.any()),
         "worst_note": note_on_unusual(analysis),
         "players": {str(sample): k for sample, k in places.items()},
         "notes": [*restart_lines(campaign), *override_lines(campaign)],

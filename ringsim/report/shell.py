@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jinja2
+import numpy as np
 from markupsafe import Markup
 
 from ringsim.files import whole, writing
 from ringsim.plots.style import HEAVY, Inline
 from ringsim.refusal import InputError
+from ringsim.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +37,7 @@ def written(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    shell.filters |= {"sentence": _sentence, "head": _head}
+    shell.filters |= {"sentence": _sentence, "head": _head, "parted": _parted}
     shape, text = shell.get_template(template), ""
     each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
@@ -63,6 +65,26 @@ def _head(text: str) -> Markup:
     paper makes browsers print all pages smaller.
     """
     return Markup("_<wbr>").join(text.split("_"))
+
+
+_MOST_COLUMNS = 12
+"""Of a table on a page, as numbers of all outputs have: so many fit a sheet of paper at the size of
+the others, and a window of 1200 px."""
+
+
+def _parted(table: Table) -> list[Table]:
+    """A table in parts of about equally many columns that fit, each with the columns of words."""
+    if len(table.head) <= _MOST_COLUMNS:
+        return [table]
+    named, others = range(table.left), np.arange(table.left, len(table.head))
+    count = -(-len(others) // (_MOST_COLUMNS - table.left))
+    return [
+        table._replace(
+            head=[table.head[k] for k in (*named, *own)],
+            rows=[[row[k] for k in (*named, *own)] for row in table.rows],
+        )
+        for own in np.array_split(others, count)
+    ]
 
 
 _BROWSERS = "chromium", "chromium-browser", "google-chrome"

@@ -3,7 +3,7 @@
 import re
 import shlex
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import xarray as xr
 
@@ -19,6 +19,7 @@ from ringsim.analysis.design import (
     law_text,
     paths_of,
 )
+from ringsim.analysis.worst import first_clause
 from ringsim.tables import number_text, unit_text
 from ringsim.variables import Cause
 
@@ -34,14 +35,18 @@ _MOST_NAMED = 20
 Rows = list[list[str]]
 
 
-def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
+def failures(
+    campaign: xr.Dataset, folder: str, told: Mapping[int, Sequence[str]] | None = None
+) -> tuple[Rows, int]:  # fmt: skip
     """Samples, ending with its cause, reason, command that repeats the first; how many rows are
     left out.
 
     Runs that lost their numbers, and sound ones in which the antenna fell short of its goal; a row
     for all that ended in the same way.  Antennas end in the same way that differ by places and
-    numbers: the row has the words of the first.
+    numbers: the row has the words of the first.  No row of samples without a cause of which all it
+    is ``told`` by sample why they ended.
     """
+    told = {} if told is None else told
     words, goals = endings(campaign), (*REACHED, UNKNOWN, NOT_RUN)
     causes = {int(cause): cause.words for cause in Cause if cause}
     codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
@@ -56,13 +61,17 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
             said.setdefault(shape, set()).add(how[2])
             alike.setdefault(shape, []).append(sample)
     rows = []
+    why = dict(zip(campaign["sample"].values.tolist(), map(first_clause, reasons), strict=True))
     for shape, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith(LOST)):
         mark = "" if len(said[shape]) == 1 else f"sample {samples[0]}: "
         ending, cause, _ = shape
-        told = ending + f" ({cause})" * bool(cause), mark + first[shape]
-        named = ", ".join(map(str, samples[:_MOST_NAMED]))
+        if not cause and all(why[k] in told.get(k, ()) for k in samples):
+            continue
+        how_told = ending + f" ({cause})" * bool(cause), mark + first[shape]
+        named = "sample " if len(samples) == 1 else "samples "
+        named += ", ".join(map(str, samples[:_MOST_NAMED]))
         named += f" and {len(samples) - _MOST_NAMED} more" * (len(samples) > _MOST_NAMED)
-        rows.append([named, *told, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])
+        rows.append([named, *how_told, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])
     return rows[:MOST_FAILURES], max(0, len(rows) - MOST_FAILURES)
 
 

@@ -142,12 +142,16 @@ class Distribution(Model):
         raise NotImplementedError
 
 
-class Continuous(Distribution):
-    """A distribution over an interval of real numbers."""
+class Ranged(Distribution):
+    """A distribution over an interval of real numbers, cut off or not."""
 
     def probability(self, value: float) -> float:
         """Cumulative probability of ``value``."""
         raise NotImplementedError
+
+
+class Continuous(Ranged):
+    """A distribution over an interval of real numbers as it is."""
 
 
 def inside(probability: Array) -> Array:
@@ -293,7 +297,7 @@ LEAST_MASS = 1e-6
 """Probability between the bounds, at least: less is a mistake in the bounds."""
 
 
-class Truncated(Distribution):
+class Truncated(Ranged):
     """The distribution ``of``, given that its value lies between ``low`` and ``high``.
 
     >>> from ringsim.sampling.distributions import Normal
@@ -349,6 +353,53 @@ class Truncated(Distribution):
         below, above = self._ends()
         values = self.of.quantile(below + (above - below) * probability)
         return np.asarray(np.clip(values, self.low, self.high))
+
+
+class Calibrated(Distribution):
+    """A distribution moved and narrowed by measured data, as ``ringsim calibrate`` finds it.
+
+    With F that of ``of``: x = F^-1(Phi(shift + remaining_scatter u)) of a standard normal u.
+
+    >>> force = Calibrated(of=Normal(mean=2.0, standard_deviation=1.0), shift=0.5,
+    ...                    remaining_scatter=0.1)
+    >>> force.quantile(np.array([0.5])).round(9).tolist()
+    [2.5]
+    """
+
+    kind: Literal["calibrated"] = "calibrated"
+    of: Annotated[Ranged, OneOf()]
+    """Distribution before the data: the prior."""
+    shift: Annotated[float, Field(ge=-40.0, le=40.0)]
+    """Of the underlying standard normal variable: how many standard deviations it has moved."""
+    remaining_scatter: Annotated[float, Field(gt=0.0, le=100.0)]
+    """Of the same: what is left of the scatter, 1 where the data say nothing."""
+    data: str = ""
+    """The test that it was learnt from."""
+
+    @model_validator(mode="after")
+    def _bare(self) -> Self:
+        if self.of.each_section or self.of.shared:
+            raise ValueError("of: give each_section and shared beside kind, not inside of")
+        return self
+
+    def quantile(self, probability: Array) -> Values:
+        """Inverse of the cumulative distribution."""
+        at = self.shift + self.remaining_scatter * scipy.special.ndtri(probability)
+        return self.of.quantile(inside(scipy.special.ndtr(at)))
+
+    def log_density(self, values: Values) -> Array:
+        """That of ``of``, times the ratio of both normal densities at the value's place."""
+        shares = np.array([self.of.probability(float(v)) for v in np.ravel(values)])
+        at = scipy.special.ndtri(inside(shares)).reshape(np.shape(values))
+        scaled = (at - self.shift) / self.remaining_scatter
+        ratio = 0.5 * (at**2 - scaled**2) - math.log(self.remaining_scatter)
+        return np.asarray(self.of.log_density(values) + ratio)
+
+    def probability(self, value: float) -> float:
+        """Cumulative probability of ``value``."""
+        share = float(inside(np.array(self.of.probability(value))))
+        at = (scipy.special.ndtri(share) - self.shift) / self.remaining_scatter
+        return float(scipy.special.ndtr(at))
 
 
 class Uniform(Continuous):

@@ -1,6 +1,7 @@
 """The design of a campaign: which values every sample has, and which paths it may vary."""
 
 import contextlib
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -18,7 +19,7 @@ from ringsim.sampling.designs.blocks import Grouped
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.distributions import Distribution, Values, extremes_of, is_label, plain
 from ringsim.scene import Scene
-from ringsim.units import unit_at
+from ringsim.units import ListIn, Model, unit_at
 
 AnyDistribution = Annotated[Distribution, OneOf()]
 AnyDesign = Annotated[Design, OneOf()]
@@ -126,6 +127,45 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
             f"{told}: leave out each_section, or give each path an input of its own"
         )
     return [f"[{k + 1}]" for k in range(min(counts.values()))]
+
+
+class Learnt(Model):
+    """Inputs that a campaign file takes from the result of a calibration."""
+
+    file: str
+    """The posterior.nc, looked up beside the campaign file."""
+    without: Annotated[tuple[str, ...], ListIn] = ()
+    """Unknowns of it that are left out: those of the test stand alone."""
+
+
+def learnt_from(
+    file: Path, without: Sequence[str] = ()
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """The inputs and correlations, as tables of a campaign file, that a calibration has found.
+
+    An input with a value for each place is one for each, as no two have learnt the same.
+    InputError if the file has none.
+    """
+    import netCDF4
+
+    try:
+        with netCDF4.Dataset(file) as data:
+            words = {name: getattr(data, name, "") for name in ("inputs", "correlations")}
+    except OSError as error:
+        raise InputError(f"inputs.from: {file.name} cannot be read: {error}") from None
+    if not words["correlations"]:
+        raise InputError(
+            f"inputs.from: {file.name} has no posterior: give the posterior.nc of ringsim calibrate"
+        )
+    inputs, pairs = json.loads(words["inputs"]), json.loads(words["correlations"])
+    for name in without:
+        if name not in inputs:
+            raise InputError(
+                f"inputs.from.without: {name} is no unknown of {file.name} "
+                f"({known_or_nearest(name, inputs)})"
+            )
+    left = {name: law for name, law in inputs.items() if name not in without}
+    return left, [pair for pair in pairs if all(name in left for name in pair["between"])]
 
 
 def first_inside(path: str, others: Iterable[str]) -> str:

@@ -1,6 +1,7 @@
 """The scene: everything that one simulation needs, strict in and exact out."""
 
 import copy
+import difflib
 import math
 import os
 from collections.abc import Iterator, Mapping
@@ -296,6 +297,16 @@ def builtin_scenes() -> dict[str, str]:
     return {name[:-5]: files[name].read_text(encoding="utf-8") for name in sorted(files)}
 
 
+def _nearest_file(path: Path) -> str:
+    """The scene file in the same folder whose name is most like it; empty if none is."""
+    try:
+        known = [each.name for each in path.parent.iterdir() if each.suffix == ".toml"]
+    except OSError:
+        return ""
+    near = difflib.get_close_matches(path.name, known, n=1, cutoff=0.8)
+    return str(path.parent / near[0]) if near else ""
+
+
 def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
     """A built-in scene by name, or a scene file; paths are relative to the folder of ``beside``.
 
@@ -311,8 +322,9 @@ def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
     path = beside.parent / name_or_path
     if not os.path.exists(path):  # Path.exists raises for names that are too long
         near = f"{path}.toml"
-        found = os.path.exists(near)
-        hint = f"did you mean {near}?" if found else known_or_nearest(name, builtin)
+        if not os.path.exists(near):
+            near = _nearest_file(path)
+        hint = f"did you mean {near}?" if near else known_or_nearest(name, builtin)
         raise InputError(f"{path}: no such file, and no built-in scene of that name ({hint})")
     table = parse_toml(read_text(path), path.name)
     if key := next((key for key in ("design", "inputs") if key in table), ""):

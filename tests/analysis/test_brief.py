@@ -170,3 +170,81 @@ def test_outputs_without_an_index_in_blocks_are_told_by_inputs_and_not_by_groups
     found["first_order_index_interval"] = found["total_index_interval"]
     row = what_matters(found).rows[0]
     assert row[:3] == ("asynchrony_max", "x1", "-")
+
+
+def test_an_interval_that_one_sample_decides_is_none():
+    """39 values between 0 and 1, and one of 50 that alone has another x1: its square is nearly all
+    of the scatter, and the index is that of one sample, with an interval longer than 1."""
+
+    def output(x):
+        return np.where(np.arange(40) == 0, 50.0, x[:, 1])
+
+    made = drawn_campaign(RandomDesign(samples=40), output, 3, 5)
+    made["x1"] = made["x1"].copy(data=1.0 * (np.arange(40) == 0))
+    lines = told(analyse(made, {}, {"x2": {"kind": "uniform", "low": 0.0, "high": 0.7}}), full=True)
+    (row,) = (line for line in lines if "standard deviation" in line and "asynch" in line)
+    assert "one sample decides it" in row
+    (row,) = (line for line in lines if line.startswith("asynchrony_max by x1"))
+    assert "few samples decide it" in row
+    usual = told(
+        analyse(drawn_campaign(RandomDesign(samples=60), lambda x: x[:, 1], 3, 5)), full=True
+    )
+    assert not any("decide it" in line or "decides it" in line for line in usual)
+
+
+def test_a_mean_that_cannot_be_negative_has_no_interval_that_is():
+    """Reweighted to where the one large value lies."""
+
+    def output(x):
+        return np.where(np.arange(60) == 7, 40.0, x[:, 1] ** 2)
+
+    made = drawn_campaign(RandomDesign(samples=60), output, 2, 3)
+    low = 0.5 * np.floor(2.0 * float(made["x2"][7]))
+    law = {"x2": {"kind": "uniform", "low": low, "high": low + 0.5}}
+    found = analyse(made, {}, law)
+    ends = found["asynchrony_max_reweighted_interval"].sel(reweighted_statistic="mean").values
+    assert ends[0] < 0.0 < ends[1]
+    (row,) = (
+        line for line in told(found, full=True)
+        if line.startswith("asynchrony_max (few)") and "  mean  " in line
+    )  # fmt: skip
+    assert "few samples decide it" in row
+
+
+def test_what_hardly_differs_is_not_explained_unless_a_requirement_asks_for_it():
+    """Of 40 N by 0.01 N, all of it x1's: no digit of it that tables give changes."""
+    made = drawn_campaign(RandomDesign(samples=200), linear, 3, 4)
+    made["peak_tension"] = "sample", 40.0 + 0.01 * made["x1"].values, {"units": "N"}
+    told_of = "not listed, because samples differ by less than 0.1 %: peak_tension"
+    table = what_matters(analyse(made))
+    assert [row[0] for row in table.rows if row[0]] == ["asynchrony_max"]
+    assert told_of in table.notes
+    wanted = {"peak_tension": {"max": 41.0, "probability": 0.9, "confidence": 0.9}}
+    assert "peak_tension" in [row[0] for row in what_matters(analyse(made, wanted)).rows]
+    alone = what_matters(analyse(made.drop_vars("asynchrony_max")))  # then it is all there is
+    assert [row[0] for row in alone.rows if row[0]] == ["peak_tension"]
+
+
+def test_a_probability_is_bounded_where_no_sample_violates():
+    """Of 40 samples without a violation 1 - 0.1^(1/40) = 0.056 at 90 %."""
+    made = drawn_campaign(RandomDesign(samples=40), linear, 2, 4)
+    wanted = {"asynchrony_max": {"max": 9.0, "probability": 0.9, "confidence": 0.9}}
+    assert round(1.0 - 0.1 ** (1 / 40), 3) == 0.056
+    assert (
+        "no sample violates asynchrony_max: the probability of a violation is at most 0.056 "
+        "(confidence 0.9)"
+    ) in told(analyse(made, wanted))
+
+
+def test_differences_of_rounding_are_told_as_zero_and_narrow_ranges_with_all_their_digits():
+    made = drawn_campaign(RandomDesign(samples=40), linear, 2, 4)
+    power = np.linspace(2.9994, 3.0, 40)
+    made["peak_motor_power"] = "sample", power, {"units": "W"}
+    checked = np.where(np.arange(40) % 20 == 0, power * (1.0 + 1e-9), np.nan)
+    made["peak_motor_power_checked"] = "sample", checked, {"units": "W"}
+    status = np.where(np.arange(40) % 20 == 0, 0, -1)
+    made["status_checked"] = "sample", status, {}
+    lines = [line for line in told(analyse(made)) if line.startswith("peak_motor_power ")]
+    numbers, errors = lines[0].split(), lines[1].split()
+    assert {"2.9997", "2.9994", "3.0000"} <= set(numbers)
+    assert errors[3:6] == ["0", "2", "0"]

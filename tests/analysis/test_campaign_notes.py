@@ -27,9 +27,7 @@ def test_the_numerical_error_of_a_sample_that_is_named_stands_beside_its_value()
     assert "in sample 4: 24" in line
     assert " N +- 0.25 at 5 s" in line
     (line,) = told([0.1, np.nan, 0.3, np.nan, np.nan])
-    assert line.endswith(
-        "; this sample has no error bar, the 2 samples that have one are within 0.3 N"
-    )
+    assert line.endswith("; largest error bar of 2 other samples: 0.3 N")
     assert "nan" not in line
     assert sum("error_bars_every" in line for line in peak_lines(made)) == 1
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from scipy.stats import multinomial, ttest_ind
+from scipy.stats import multinomial, spearmanr, ttest_ind
 
 from made import campaign, drawn_campaign, ishigami, response
 from ringsim.analysis import intervals
@@ -194,6 +194,53 @@ def test_shares_of_outcomes_and_of_requirements_differ_by_an_interval():
     expected = difference_of_shares((0, COUNT), (COUNT // 8, COUNT))
     assert found.kind_share_difference_interval.values == pytest.approx(expected)
     assert "requirement" not in found.dims
+
+
+def test_a_verdict_that_changes_is_told():
+    """All keep to it in one, none in the other; of one that both meet nothing is said."""
+    wanted = REQUIRED | {"peak_tension": {"max": 9.0, "probability": 0.9, "confidence": 0.9}}
+    told = {"requirements": json.dumps(wanted)}
+    tension = np.linspace(1.0, 2.0, COUNT)
+    one, two = (
+        seeded(values, peak_tension=tension).assign_attrs(told)
+        for values in (VALUES / VALUES.max(), 2.0 + VALUES)
+    )
+    found = compare(one, two)
+    assert found.kept_verdict.sel(requirement="asynchrony_max <= 1.5 deg").values.tolist() == [2, 0]
+    lines = compared(found)
+    assert [line for line in lines if "->" in line] == ["asynchrony_max <= 1.5 deg: met -> not met"]
+    (row,) = (line for line in lines if line.startswith("peak_tension <= 9 N"))
+    assert row.split()[-2:] == ["met", "met"]
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        (VALUES**3, ""),
+        (9.0 - VALUES, "turn round"),
+        (np.random.default_rng(3).random(COUNT), "hardly go together"),
+        (5.0 + 1e-4 * VALUES, ""),  # all the same to the digits that are told
+    ],
+)
+def test_the_ranks_of_pairs_are_told_to_turn_round(other, words):
+    found = compare(seeded(VALUES), seeded(other))
+    expected = spearmanr(VALUES, other).statistic if np.ptp(other) > 1e-2 else np.nan
+    assert found.asynchrony_max_rank_correlation.item() == pytest.approx(expected, nan_ok=True)
+    told = [line for line in compared(found) if "ranks of pairs" in line]
+    assert len(told) == bool(words)
+    assert all(f"{words}: " in line for line in told)
+    assert all(line.endswith(f"asynchrony_max ({expected:+.2f})") for line in told)
+
+
+def test_an_output_that_one_of_two_does_not_have_is_told_as_none():
+    """The other one never deploys."""
+    one, other = (campaign([2.0], deployment_time=np.array([t])) for t in (25.0, np.nan))
+    runs = [each.isel(sample=0, drop=True) for each in (one, other)]
+    for both in (runs, (one, other)):
+        (row,) = (line for line in compared(compare(*both)) if line.startswith("deployment_time"))
+        assert row.split()[:4] == ["deployment_time", "s", "25", "none"]
+    (row,) = (line for line in compared(compare(*runs[::-1])) if line.startswith("deployment"))
+    assert row.split()[2:4] == ["none", "25"]
 
 
 def test_shares_of_replicates_scatter_as_these_do():

@@ -50,6 +50,24 @@ def test_one_input_that_decides_the_ranks_is_told_as_the_cause():
     assert "peak_tension (60 samples used: one input determines the ranks)" in note
 
 
+def test_a_column_that_is_the_same_in_all_samples_leaves_the_others_their_correlations():
+    random = np.random.default_rng(4)
+    columns = random.random((40, 3))
+    output = columns[:, 0] + 0.5 * columns[:, 1] + random.normal(size=40)
+    ranks = indices.centred_ranks(np.insert(columns, 1, 8.0, axis=1))
+    found = indices.partial_correlations(ranks, output)
+    assert np.isnan(found[1])
+    alone = indices.partial_correlations(indices.centred_ranks(columns), output)
+    np.testing.assert_allclose(np.delete(found, 1), alone, rtol=1e-12)
+    with_odd = np.vstack([[0.9, 0.9, 0.9], columns])  # one sample more, without a value
+    odd = np.where(np.arange(41) == 0, 99.0, 8.0)
+    values = {"x1": with_odd[:, 0], "x2": odd, "x3": with_odd[:, 1], "x4": with_odd[:, 2]}
+    lines = told(analyse(with_inputs(campaign([np.nan, *output]), **values)), full=True)
+    (row,) = (line for line in lines if line.startswith("asynchrony_max with x1"))
+    assert f"  {found[0]:.2g}  " in row
+    assert "x2 is the same in all samples used for asynchrony_max: no correlation with it" in lines
+
+
 def test_partial_correlations_are_those_of_residuals():
     random = np.random.default_rng(1)
     columns = random.normal(size=(60, 3))

@@ -57,3 +57,9 @@ def test_failures_tell_what_is_other_and_nothing_speaks_of_chance(campaign: xr.D
     assert "these samples stand for no population: there is no probability to estimate" in lines
     drawn = told(analyse(campaign.assign_attrs(design='{"kind": "random"}'), LIMIT))
     assert not any("population" in line for line in drawn)
+
+
+def test_what_is_the_same_in_all_cases_has_its_value(campaign: xr.Dataset) -> None:
+    campaign["peak_tension"][:] = 40.0
+    (line,) = (each for each in told(analyse(campaign)) if each.startswith("the same in all"))
+    assert "peak_tension 40 N" in line

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 from SALib.analyze import morris as salib_morris
 from SALib.analyze import sobol as salib_sobol
 
@@ -201,6 +202,49 @@ def test_the_gate_shuts_by_chance_in_one_case_of_twenty_at_most():
     shut = [dependence(random.random(320) < 0.05, columns, block) < 0.05 for _ in range(100)]
     # Three standard errors above 5 %.
     assert np.mean(shut) < 0.05 + 3 * 0.022
+
+
+def test_one_lost_sample_is_by_chance_where_no_other_has_its_value():
+    """One of n is lost, and one has a rare value: they meet in one case of n, and each of two tests
+    (ranks and their distance from the middle) of each input may err.  Shuffles know that to 2 %."""
+    random, lost = np.random.default_rng(11), np.arange(40) == 15
+    odd = np.where(lost, 8.0, 99.0)[:, None]
+    assert dependence(lost, odd) == pytest.approx(2 / 40, rel=0.1)
+    assert dependence(lost, np.hstack([odd, random.random((40, 84))])) == 1.0
+
+
+@pytest.mark.parametrize(("both", "lost", "rare"), [(4, 5, 6), (3, 3, 4), (12, 30, 14)])
+def test_the_gate_of_an_input_of_two_values_is_fishers_exact_test(both, lost, rare):
+    missing, column = np.zeros((2, 60), dtype=bool)
+    missing[:lost] = column[lost - both : lost - both + rare] = True
+    rest = [[both, lost - both], [rare - both, 60 - lost - rare + both]]
+    exact = scipy.stats.fisher_exact(rest).pvalue
+    found = dependence(missing, column[:, None] + 0.0)
+    assert found == pytest.approx(2 * exact, rel=0.1 if exact > 1e-3 else 0.4)
+
+
+def test_the_gate_shuts_by_chance_as_seldom_where_inputs_are_seldom_other_than_usual():
+    random = np.random.default_rng(12)
+    shut = []
+    for _ in range(300):
+        columns = (random.random((40, 10)) < 0.05) + 0.0
+        missing = np.isin(np.arange(40), random.choice(40, 2, replace=False))
+        shut.append(dependence(missing, columns) < 0.05)
+    assert np.mean(shut) < 0.05 + 3 * 0.0126  # three standard errors
+
+
+def test_one_lost_sample_leaves_the_others_their_index():
+    """The sample with the largest x1 has no value, as one that alone has a motor stopped."""
+    made = drawn_campaign(
+        RandomDesign(samples=60), lambda x: x[:, 0] + 0.1 * x[:, 1], 5, 3,
+        lost=lambda x: x[:, 0] == x[:, 0].max(),
+    )  # fmt: skip
+    made["x2"] = made["x2"].copy(data=np.where(made.status == 0, 99.0, 8.0))
+    found = analyse(made)
+    assert found.given_data_index.sel(output="asynchrony_max", input="x1") > 0.9
+    lines = [line for line in told(found) if "without a value" in line]
+    assert len(lines) == 1
+    assert "too few to tell whether that depends on an input" in lines[0]
 
 
 def test_the_gate_sees_an_interaction_by_its_blocks():

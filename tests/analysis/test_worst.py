@@ -16,9 +16,11 @@ from ringsim.analysis.design import median_and_worst
 from ringsim.analysis.intervals import quantities, worst_sample
 from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import statistics_table
+from ringsim.analysis.study_text import statistics_table, told, verdict_lines
+from ringsim.analysis.worst import margin_table
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
+from ringsim.scene import load_scene
 
 pytestmark = pytest.mark.quick
 
@@ -53,6 +55,39 @@ def test_the_least_margin_of_all_samples_is_told_not_the_largest() -> None:
     at = list(table.head).index("worst sample")
     rows = {row[0]: row[at] for row in table.rows}
     assert (rows["least_drive_margin"], rows["peak_tension"]) == ("1", "7")
+
+
+def with_limits(made: xr.Dataset, **limits: float) -> xr.Dataset:
+    values = {f"limits.{name}": value for name, value in limits.items()}
+    scene = load_scene("ring18-cable").with_values(values)
+    return made.assign_attrs(scene=scene.to_toml())
+
+
+def test_margins_to_limits_are_those_of_the_worst_sample_at_any_time() -> None:
+    """Sample k peaks at 20 + k N; sample 2 goes to 29 N behind its last lock, and 7 is lost."""
+    made = with_limits(made_campaign(8, failed=(7,)), tension=30.0)
+    found = analyse(made)
+    assert found["limit_text"].values.tolist() == ["limits.tension = 30 N"]
+    assert found["limit_margin"].item() == pytest.approx(30.0 / 26.0 - 1.0)
+    assert found["limit_sample"].item() == 6
+    made["cable_tension"][2, 0, 0, -1] = 29.0
+    found = analyse(made)
+    assert found["limit_margin"].item() == pytest.approx(30.0 / 29.0 - 1.0)
+    (row,) = margin_table(found).rows
+    assert row == ("limits.tension = 30 N", "peak_tension", "29 N", "+0.0345", "2")
+    assert "limits.tension = 30 N" in "\n".join(verdict_lines(made))
+    assert not margin_table(analyse(made_campaign(8))).rows
+
+
+def test_a_limit_that_is_passed_and_a_margin_that_is_short_are_told_above_the_verdicts() -> None:
+    made = with_limits(with_motors(made_campaign(8, failed=(0,))), tension=20.0)
+    wanted = {"asynchrony_max": {"max": 90.0, **BOUND}}
+    lines = told(analyse(made, wanted))
+    (passed,) = (k for k, line in enumerate(lines) if line.startswith("limits.tension = 20 N"))
+    (short,) = (k for k, line in enumerate(lines) if line.startswith("least_drive_margin >= 0"))
+    assert lines[passed].split()[-4:] == ["-0.259:", "NOT", "enough", "7"]  # 20 / 27 - 1
+    assert lines[short].split()[-4:] == ["-0.4:", "NOT", "enough", "1"]
+    assert max(passed, short) < next(k for k, line in enumerate(lines) if "verdict" in line)
 
 
 def test_equal_values_take_the_first_sample_and_places_in_time_have_no_worst() -> None:

@@ -89,8 +89,10 @@ def test_the_last_line_says_whether_bars_cover_the_differences() -> None:
     assert lines[2] == "median and worst are over the 2 samples that both engines completed"
     assert lines[-1] == (
         "the engines differ by more than their error bars in deployment_time (sample 1: 0.03 s, "
-        "error bars 0.025)"
+        "both error bars 0.025)"
     )
+    (head,) = (line for line in lines if line.startswith("difference of"))
+    assert "both error bars there" in head  # of two engines, not those of one as elsewhere
     near = check_lines(campaign(deployment_time_checked=[10.01, 11.02, NAN, NAN]))
     assert near[-1] == "the engines differ by no more than their error bars"
     # Of what tables do not list it says nothing: moments, and numbers that are the same.
@@ -135,3 +137,13 @@ def test_a_number_that_one_engine_lacks_differs_by_all() -> None:
 def test_a_campaign_without_checks_says_nothing() -> None:
     plain = campaign()
     assert check_lines(plain.drop_vars([n for n in plain if str(n).endswith("_checked")])) == []
+
+
+def test_stresses_are_told_in_the_unit_of_all_other_tables() -> None:
+    values = {"peak_rod_stress": [6.0e6] * 4, "peak_rod_stress_checked": [6.1e6, 6.0e6, NAN, NAN]}
+    bars = {f"peak_rod_stress_error{end}": [1e4] * 4 for end in ("", "_checked")}
+    lines = check_lines(campaign(**values, **bars))
+    (row,) = (line for line in lines if line.startswith("peak_rod_stress"))
+    assert row.split()[1:6] == ["MPa", "0.05", "0.1", "0", "0.016"]
+    assert row.split()[6] == "0.02"
+    assert "0.1 MPa, both error bars 0.02" in lines[-1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from ringsim.frame.model import FrameModel
 from ringsim.outputs.base import BaseReaction, BaseRotation
 from ringsim.outputs.joints import first_impulse
 from ringsim.scene import Scene, load_scene
+from ringsim.variables import Outcome
 
 CRAFT = {"mass": 20.0, "inertia": [2.0, 3.0, 4.0], "centre": [0.3, 0.1, 0.2]}
 
@@ -155,23 +158,64 @@ def test_a_heavy_spacecraft_is_a_fixed_base() -> None:
         assert np.abs(craft.values[name] - fixed.values[name]).max() < 1e-3 * largest
 
 
-def test_impulse_of_a_bounce() -> None:
-    """A half wave of torque a sin(w t) has the impulse 2 a / w; what follows does not count."""
-    rate, start = 40.0, 0.123
-    times = np.linspace(0.0, 0.5, 2001)
-    torques = np.where(times > start, np.sin(rate * (times - start)), 0.0)
-    assert first_impulse(times, torques, start) == pytest.approx(2.0 / rate, rel=1e-3)
-    assert first_impulse(times, 0.0 * torques, start) == 0.0
+@pytest.mark.parametrize("drag", [0.0, 0.3, 0.9, 3.0])
+def test_impulse_of_a_bounce(drag: float) -> None:
+    """I w (1 + e) of a joint that meets a linear stop alone, which needs 2 acos(drag) / (f root) to
+    throw it back, f the natural frequency and root = sqrt(1 - drag^2), with acosh and drag^2 - 1
+    where it is overdamped.  What follows does not count."""
+    inertia, met, natural, start = 0.7, 0.4, 40.0, 0.123
+    times = np.linspace(0.0, 1.5, 60001)
+    since = np.maximum(times - start, 0.0)
+    poles = np.roots([1.0, 2.0 * drag * natural, natural**2]).astype(complex)
+    waves = np.exp(poles[:, None] * since) * met / (poles[0] - poles[1])
+    rates, gain = (((poles**k) * [1.0, -1.0] @ waves).real for k in (1, 2))
+    turn = math.acos(drag) if drag < 1.0 else math.acosh(drag)
+    end = 2.0 * turn / natural / math.sqrt(abs(1.0 - drag**2))
+    back = -np.interp(start + end, times, rates) / met
+    torques = np.where(times > start, inertia * gain, 0.0)
+    found = first_impulse(times, torques, rates, start)
+    assert found == pytest.approx(inertia * met * (1.0 + back), rel=1e-3)
+    assert first_impulse(times, 0.0 * torques, rates, start) == 0.0
+
+
+@pytest.mark.parametrize("after", [0.2, 1.0, 20.0])
+def test_impulse_of_a_lock_is_not_what_presses_on(after: float) -> None:
+    """A latched joint that a torque M presses on: 2 I w and M over the contact, which ends when it
+    leaves as fast as it came, however long the run goes on.  Its stop holds M for good."""
+    inertia, met, natural, load, start = 0.7, 0.4, 40.0, 5.0, 0.123
+    times = np.arange(0.0, start + after, 2e-5)
+    turned = natural * np.maximum(times - start, 0.0)
+    sag = load / inertia / natural**2
+    rates = met * np.cos(turned) + sag * natural * np.sin(turned)
+    torques = load - inertia * natural * (sag * natural * np.cos(turned) - met * np.sin(turned))
+    assert torques.min() < load < torques.max()
+    held = 2.0 * (math.pi - math.atan(met / (sag * natural))) / natural
+    torques = np.where(times > start + 0.15, load, np.where(times < start, 0.0, torques))
+    rates = np.where(times > start + 0.15, 0.0, rates)
+    found = first_impulse(times, torques, rates, start)
+    assert found == pytest.approx(2.0 * inertia * met + load * held, rel=1e-3)
+
+
+LOCKING: dict[str, Any] = {
+    "structure__sections": 3, "structure__opening_angle": 165.0, "loads__force": 0.1,
+    "solver__step": 5e-4, "solver__end_time": 0.6, "stop__latch": True,
+    "solver__newton_tolerance": 1e-6, "solver__energy_tolerance": 1e3, "boom": "none",
+    "structure__aspect_ratio": 1.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("by", [by_frames, by_exudyn])
+def test_impulses_do_not_tell_how_long_a_run_waits(by: Callable[[Scene], Outcome]) -> None:
+    """Loads press the joints on their latches to the end."""
+    scene = ring(**LOCKING)
+    short, long = (by(scene.with_values({"solver.settling_time": t})).values for t in (0.05, 0.15))
+    assert long["final_time"] > short["final_time"] + 0.09
+    assert long["peak_lock_impulse"] == pytest.approx(short["peak_lock_impulse"], rel=1e-6)
 
 
 def test_locks_have_impulses() -> None:
     """Inertia times rate before and after: nearly all V-joints alike in an even ring."""
-    scene = ring(
-        structure__sections=3, structure__opening_angle=165.0, loads__force=0.1,
-        solver__step=5e-4, solver__end_time=0.6, stop__latch=True, solver__settling_time=0.02,
-        solver__newton_tolerance=1e-6, solver__energy_tolerance=1e3, boom="none",
-        structure__aspect_ratio=1.0,
-    )  # fmt: skip
+    scene = ring(**LOCKING, solver__settling_time=0.02)
     here, there = by_frames(scene).values, by_exudyn(scene).values
     assert np.isfinite(here["lock_impulse"]).all()
     assert (here["lock_impulse"] > 0.0).all()

@@ -170,7 +170,7 @@ WRONG_FILES = {
     "no place": (ENCODER.replace('place = { plane = "upper", section = 2 }', ""),
                  "place = { plane = ..., section = ... }"),
     "a value over time": (ENCODER.replace('column = "enc"', "value = 3.0"), "give column"),
-    "neither": (ENCODER.replace('column = "enc"', ""), "neither given"),
+    "neither": (ENCODER.replace('column = "enc"', ""), "has neither column nor value"),
     "no scatter": (ENCODER.replace("standard_deviation = 0.002", "standard_deviation = 0.0"),
                    "standard_deviation = 0.0 must be above 0"),
     "twice": (ENCODER + ENCODER, "two of them measure opening_angle upper 2"),
@@ -244,3 +244,29 @@ def test_commands_compare_and_draw(run: xr.Dataset, tmp_path: Path) -> None:
     )
     assert refused.exit_code == 2
     assert "--measured" in refused.output
+
+
+def test_netcdf_holds_the_same_readings(tmp_path: Path) -> None:
+    rows = [["t", "enc", "cell"], ["100", "1.0", "2.0"], ["200", "", "3.0"], ["300", "1.5", "nan"]]
+    from_csv = load_measured(written(tmp_path, HEAD + ENCODER + CELL, rows))
+    values = {name: np.array([float(row[k] or "nan") for row in rows[1:]])
+              for k, name in enumerate(rows[0])}  # fmt: skip
+    xr.Dataset({name: ("record", each) for name, each in values.items()}).to_netcdf(
+        tmp_path / "stand.nc"
+    )
+    toml = (tmp_path / "stand.toml").read_text().replace("stand.csv", "stand.nc")
+    (tmp_path / "other.toml").write_text(toml)
+    from_netcdf = load_measured(tmp_path / "other.toml")
+    for one, other in zip(from_csv.readings, from_netcdf.readings, strict=True):
+        np.testing.assert_array_equal(one.times, other.times)
+        np.testing.assert_array_equal(one.values, other.values)
+        assert (one.missing, one.gaps) == (other.missing, other.gaps)
+    xr.Dataset({"t": ("record", values["t"]), "enc": (("a", "b"), np.ones((2, 2)))}).to_netcdf(
+        tmp_path / "square.nc"
+    )
+    for name, words in {
+        "square.nc": "numbers along one dimension", "none.nc": "none.nc: cannot be read",
+    }.items():  # fmt: skip
+        (tmp_path / "other.toml").write_text(toml.replace("stand.nc", name))
+        with pytest.raises(InputError, match=words):
+            load_measured(tmp_path / "other.toml")

@@ -48,6 +48,16 @@ def test_check_prints_the_margin_of_the_ideal_ring(scene: Scene, tmp_path: Path)
     assert re.search(r"^nasa-std-5017b: least", both, re.M)
 
 
+def test_check_does_not_end_with_valid_alone_where_the_drive_is_short(
+    scene: Scene, tmp_path: Path
+) -> None:
+    for standard, words in ((scene, "NOT enough"), (scene.with_values({"margin": "none"}), "")):
+        (file := tmp_path / "one.toml").write_text(standard.to_toml())
+        last = CliRunner().invoke(cli, ["check", str(file)]).output.splitlines()[-1]
+        assert last.startswith("valid")
+        assert (words in last) if words else (last == "valid: ringsim run FILE runs it")
+
+
 def test_the_printed_formula_gives_the_printed_margin(scene: Scene, tmp_path: Path) -> None:
     """Factors of the line below the table, forces of its rows."""
     sprung = scene.with_values(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim.plots.rods_and_cables import cables, section_series, section_spans
+from ringsim.plots.rods_and_cables import cables, pulleys, section_series, section_spans
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 
@@ -51,3 +51,14 @@ def test_series_belong_to_their_spans(values: dict[str, Any]) -> None:
             lengths = section_spans(run, plane).lengths[0][:, [0, -1]]
             assert (np.ptp(lengths, axis=1) < 1e-12).all() == ("end" not in values)
     assert cables(run).axes
+
+
+def test_curves_that_lie_on_each_other_are_both_seen() -> None:
+    """Hinge pulleys of a section pass on alike: the lower curve is broad, the upper one dashed."""
+    run = ran()
+    for axes in pulleys(run.assign(pulley_ratio=0.0 * run["pulley_ratio"] + 0.9)).axes:
+        first, vertex, *second = axes.lines[:3]
+        assert first.get_linewidth() > 2.0 * vertex.get_linewidth()
+        for line in second:
+            assert line.get_linestyle() == "--"
+            assert line.get_linewidth() < vertex.get_linewidth()

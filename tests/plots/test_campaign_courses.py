@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from made_campaign import SECTIONS, TIMES, lags, made_campaign
+from made_campaign import SECTIONS, TIMES, lags, made_campaign, with_motors
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -13,6 +13,8 @@ from ringsim.analysis import courses as courses_module
 from ringsim.analysis import design as blocks_module
 from ringsim.analysis.courses import course, courses
 from ringsim.plots.campaign.courses import fan, lag_map
+from ringsim.plots.campaign.endings import base_load, motors
+from ringsim.plots.campaign.frame import shown_until
 
 GOOD = [0, 1, 3, 4, 6]
 
@@ -153,3 +155,27 @@ def test_the_map_shows_the_median_and_the_worst(mixed: xr.Dataset) -> None:
     scales = [axes.collections[0].get_clim() for axes in (*upper, *lower)]
     assert scales == [scales[0]] * 4
     assert scales[0][1] == pytest.approx(np.abs(wanted[-1]).max(), abs=1e-5)
+
+
+def test_one_sample_that_runs_on_does_not_squeeze_all_others() -> None:
+    """Of 30 rings 29 deploy within 4 s, and one stalls until 10 s."""
+    campaign = with_motors(made_campaign(30, stalled=(7,)))
+    late = np.arange(30) == 7
+    campaign["deployment_time"][:] = np.where(late, np.nan, np.linspace(3.0, 4.0, 30))
+    campaign["final_time"][:] = np.where(late, 10.0, 4.0)
+    until, told = shown_until(campaign)
+    nearly = np.sort(np.where(late, 10.0, campaign["deployment_time"]))[28]
+    assert until == pytest.approx(1.25 * nearly)
+    assert told == f" Time ends at {until:.3g} s: 1 sample goes on, until 10 s."
+    for draw in (fan, lag_map, motors, base_load):
+        figure = draw(campaign)
+        below = figure.get_supxlabel() + "".join(
+            each.get_title().get_text() for each in figure.legends
+        )
+        assert told.strip() in " ".join(below.split()), draw
+        ends = [a.get_xlim()[1] for a in figure.axes if "Time since" in a.get_xlabel()]
+        assert ends
+        assert all(until - 0.5 <= end <= until for end in ends), draw
+    # Of few none is an exception.
+    assert shown_until(campaign.isel(sample=slice(0, 10))) == (np.inf, "")
+    assert shown_until(made_campaign(30)) == (np.inf, "")

@@ -21,7 +21,7 @@ from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.outputs.family import VARIABLES
 from ringsim.plots import style
-from ringsim.plots.campaign import endings
+from ringsim.plots.campaign import endings, frame
 from ringsim.plots.campaign.courses import lock_order, shares
 from ringsim.plots.campaign.endings import angle_grid, base_load, laid_on, margin, motors, tension
 from ringsim.plots.campaign.frame import moves, shown
@@ -100,10 +100,11 @@ def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
     at = step.get_ydata()[step.get_xdata() <= limit.get_xdata()[0]][-1]
     found = analyse(campaign).sel(requirement="deployment_time")
     assert at == pytest.approx(float(found["probability"]))
-    # By numpy, with what never deployed beyond all times.
-    ran = np.append(times[deployed], np.full(3, 1e9))
-    np.testing.assert_allclose(dots.get_xdata(), np.quantile(ran, [0.05, 0.5]))
-    assert dots.get_ydata().tolist() == [0.05, 0.5]
+    # Quantiles are those of the table, at the height that the curve has there.
+    told = analyse(campaign)["deployment_time"]
+    names = ["quantile_05", "median", "quantile_95"]
+    np.testing.assert_allclose(dots.get_xdata(), told.sel(statistic=names))
+    np.testing.assert_allclose(dots.get_ydata(), np.array([0.05, 0.5, 0.95]) * 15 / 18)
     assert "did not happen in the other samples" in words(distributions(campaign))
     # A model that tells no time of what deployed is not an antenna that fails.
     campaign["outcome"][:] = int(Fate.DEPLOYED)
@@ -111,6 +112,31 @@ def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
         a for a in distributions(campaign).axes if a.get_xlabel().startswith("Time at which")
     )
     assert panel.lines[0].get_ydata()[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "bound", "below"),
+    [
+        ("least_latch_rate", {}, True), ("peak_latch_rate", {}, False),
+        ("least_latch_rate", {"max": 9.0}, False), ("peak_latch_rate", {"min": 0.1}, True),
+    ],
+)  # fmt: skip
+def test_what_did_not_happen_counts_on_the_bad_side_of_a_number(
+    name: str, bound: dict[str, float], below: bool
+) -> None:
+    """Of a ring whose latches were never met the least rate is no better than all others."""
+    campaign = made_campaign(10, stalled=(0, 5))
+    rates = np.where(np.isfinite(campaign["deployment_time"]), 1.0 + np.arange(10.0), np.nan)
+    campaign[name] = "sample", rates, {"units": "rad s-1", "long_name": "some rate"}
+    wanted = {name: bound | {"probability": 0.5, "confidence": 0.9}} if bound else {}
+    campaign.attrs["requirements"] = json.dumps(wanted)
+    (panel,) = (a for a in distributions(campaign).axes if a.get_xlabel().startswith("Some rate"))
+    step, dots = panel.lines[:2]
+    ends = [step.get_ydata()[0], step.get_ydata()[-1]]
+    assert ends == pytest.approx([0.2, 1.0] if below else [0.0, 0.8])
+    middle = np.nanmedian(rates)
+    assert dots.get_xdata()[1] == pytest.approx(middle)
+    assert dots.get_ydata()[1] == pytest.approx(0.6 if below else 0.4)
 
 
 def test_tension_by_span(mixed: xr.Dataset) -> None:
@@ -121,6 +147,8 @@ def test_tension_by_span(mixed: xr.Dataset) -> None:
         np.testing.assert_allclose(middle.get_ydata(), 23.0 / spans)
         np.testing.assert_allclose(axes.lines[1].get_ydata(), 26.0 / spans)
     assert "largest tension: sample 6" in words(figure)
+    # However many spans there are, none has the number 0.
+    assert figure.axes[-1].get_xlim() == pytest.approx((spans[0] - 0.6, spans[-1] + 0.6))
 
 
 def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
@@ -135,6 +163,16 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     assert labels == ["3.0", "none"]
     assert "below the line" not in words(by_input(made_campaign(3)))
     assert places.tolist() == [0, 1] * 4
+
+
+def test_numbers_among_words_stand_by_size(mixed: xr.Dataset) -> None:
+    stops = ["8.0", "none", "24.0", "4.0", "-1.5", "1e2", "4.0", "none"]
+    made = mixed.assign(
+        cables_lower_winch_stop_time=mixed["cables_lower_winch_stop_time"].copy(data=stops)
+    )
+    places, labels = drawn(made["cables_lower_winch_stop_time"])
+    assert labels == ["-1.5", "4.0", "8.0", "24.0", "1e2", "none"]
+    assert [labels[int(place)] for place in places] == stops
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 7])
@@ -377,6 +415,13 @@ def test_panels_are_for_numbers_that_differ_or_have_limits() -> None:
     assert "deployment_time" not in flat
 
 
+def test_a_percentage_stays_on_its_line(mixed: xr.Dataset) -> None:
+    for length in range(60, 120):
+        figure = Figure(figsize=(8.0, 4.0))
+        frame.head(figure, mixed, "Any", f"{'x' * length} by less than 0.1 % of it " + "y " * 80)
+        assert not [line for line in figure.get_supxlabel().split("\n") if line.startswith("%")]
+
+
 def test_a_sheet_has_the_panels_that_matter_and_names_the_others() -> None:
     """Nine at most: what is required first, and inputs in the order of their correlations."""
     campaign = made_campaign(8)
@@ -434,3 +479,27 @@ def test_the_course_of_the_margin_begins_where_runs_begin() -> None:
     np.testing.assert_allclose(laid[:3, 0], [-0.5, 0.4, 2.0])
     np.testing.assert_allclose(laid[:3, -1], 5.0)
     assert np.isnan(laid[3, [0, -1]]).all()
+
+
+@pytest.mark.parametrize("kind", ["random", "one-at-a-time"])
+def test_stress_has_the_numbers_of_its_unit_in_all_figures(kind: str) -> None:
+    campaign = made_campaign(12)
+    campaign.attrs["design"] = json.dumps({"kind": kind})
+    variable = VARIABLES["peak_rod_stress"]
+    about = {"long_name": variable.long_name, "units": variable.units}
+    campaign["peak_rod_stress"] = "sample", np.linspace(5e6, 8e6, 12), about
+    seen = set()
+    for picture, figure in figures_of(campaign):
+        for axes in figure.axes:
+            titled = axes.get_title(loc="left") if not axes.get_ylabel() else ""
+            for axis, words in ((axes.xaxis, axes.get_xlabel()), (axes.yaxis, titled)):
+                if "stress" in words.lower() and "(" in words:
+                    assert "(MPa)" in words
+                    figure.draw_without_rendering()
+                    places = axis.get_majorticklocs()
+                    told = axis.get_major_formatter().format_ticks(places)
+                    scale = float(axis.get_major_formatter().get_offset() or 1.0)
+                    numbers = [scale * float(text) for text in told]
+                    assert numbers == pytest.approx(1e-6 * places)
+                    seen.add(picture.name)
+    assert seen == ({"one_by_one"} if kind == "one-at-a-time" else {"distributions", "convergence"})

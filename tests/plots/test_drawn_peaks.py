@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from ringsim.plots.figures import draw_figures
-from ringsim.plots.peaks import peak_of
 from ringsim.plots.ring import strain_over_length, tension_over_length
 from ringsim.plots.rods_and_cables import cables, nodal_forces, rod_stress
-from ringsim.plots.run import asynchrony
+from ringsim.plots.run import asynchrony, peak_of
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 

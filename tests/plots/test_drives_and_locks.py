@@ -12,7 +12,7 @@ from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_motor
 from ringsim.analysis.courses import courses, ends
 from ringsim.plots.campaign.endings import latch_rate, lock_impulse, margin
 from ringsim.plots.campaign.endings import motors as motors_of_samples
-from ringsim.plots.drives_and_locks import drive, least_rate, locks, motors
+from ringsim.plots.drives_and_locks import drive, least_rate, locks, motors, stop_times
 from ringsim.plots.figures import figures_of
 from ringsim.plots.style import locked_time
 from ringsim.scene import Scene, load_scene
@@ -89,6 +89,19 @@ def test_locks_of_a_run_stand_by_section(campaign: xr.Dataset) -> None:
     assert len(locks(run.drop_vars(["latch_rate", "lock_impulse"])).axes) == 1
 
 
+def test_marks_that_are_nearly_alike_are_whole(campaign: xr.Dataset) -> None:
+    """Impulses of all V-joints within a hundredth, in a run and in a campaign."""
+    campaign["lock_impulse"] = 10.6 + 1e-2 * campaign["lock_impulse"] / 20.0
+    for figure in (locks(campaign.isel(sample=3, drop=True)), lock_impulse(campaign)):
+        figure.draw_without_rendering()
+        axes = figure.axes[2 if len(figure.axes) == 3 else 0]
+        most = max(np.nanmax(line.get_ydata()) for line in axes.lines)
+        radius = max(line.get_markersize() for line in axes.lines) * figure.dpi / 144.0
+        top = axes.transData.transform((0.0, most))[1] + radius
+        assert top < axes.get_window_extent().y1
+        assert axes.get_ylim()[0] == 0.0
+
+
 def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
     craft = {"mass": 20.0, "inertia": [3.0, 3.0, 2.0]}
     values = {
@@ -97,15 +110,27 @@ def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
     }  # fmt: skip
     run = simulate(load_scene("ring18-cable").with_values(values))
     ((_, figure),) = figures_of(run, "base")
-    turn, place = figure.axes
+    turn, _, force, _ = figure.axes
     known = run["base_rotation"].dropna("time")
     way = run["position"].sel(point="upper corner 1").dropna("time")
-    for axes, wanted in ((turn, known), (place, way - way[..., 0])):
+    loads = (run[name].dropna("time") for name in ("base_force", "base_torque"))
+    drawn = zip(figure.axes, (known, way - way[..., 0], *loads), strict=True)
+    for axes, wanted in drawn:
         for row, line in zip(wanted.transpose("axis", "time").values, axes.lines, strict=False):
             assert line.get_ydata()[: len(row)] == pytest.approx(row)
-    assert "spacecraft" in figure.get_suptitle()
+    assert "(deg)" in turn.get_ylabel()
+    assert "(N)" in force.get_ylabel()
+    told = "Attitude, place, force and torque of the spacecraft"
+    assert " ".join(figure.get_suptitle().split()).startswith(told)
+    # The title tells no more than there is.
     still = run.assign(base_rotation=0.0 * run["base_rotation"])
-    assert not list(figures_of(still, "base"))
+    ((_, figure),) = figures_of(still, "base")
+    assert figure.get_suptitle().startswith("Force and torque of the base")
+    assert len(figure.axes) == 2
+    bare = run.drop_vars(["base_force", "base_torque", "position"])
+    ((_, figure),) = figures_of(bare, "base")
+    assert figure.get_suptitle().startswith("Attitude of the spacecraft")
+    assert not list(figures_of(still.drop_vars(["base_force", "base_torque"]), "base"))
 
 
 def test_motors_of_a_run_have_a_panel_a_quantity(campaign: xr.Dataset) -> None:
@@ -190,10 +215,10 @@ def with_margin(least: float, moment: float, stop: float) -> xr.Dataset:
     ("moment", "stop", "told"),
     [
         (5.0, math.inf, "least margin -0.005 at 100 deg"),
-        (2.0, 6.0, "least margin -0.005 at 52 deg\n"
+        (2.0, 6.0, "least margin -0.005 at 52 deg; "
          "no margin from 6 s on: the winch of the lower cable has stopped"),
         # The least one of all comes after the stop: of those before, it is the last.
-        (8.0, 4.0, "least margin 0.560 at 76 deg\n"
+        (8.0, 4.0, "least margin 0.560 at 76 deg; "
          "no margin from 4 s on: the winch of the lower cable has stopped"),
     ],
 )  # fmt: skip
@@ -202,10 +227,35 @@ def test_the_margin_of_a_run_ends_where_a_winch_stops(
 ) -> None:
     run = with_margin(-0.005, moment, stop)
     axes = drive(run).axes[1]
-    assert told in [text.get_text() for text in axes.texts]
+    assert told == axes.get_title(loc="left")  # above the frame, where no curve runs
     assert axes.get_ylabel().startswith("Margin by NASA-STD-5017B")
     last = TIMES[stop > TIMES][-1]
     curve, _, least = axes.lines
     known = np.isfinite(curve.get_ydata())
     assert curve.get_xdata()[known][-1] == pytest.approx(20.0 + 16.0 * last)
     assert least.get_ydata()[0] == pytest.approx(curve.get_ydata()[known].min())
+
+
+def test_margins_of_a_campaign_end_where_the_winch_of_a_sample_stops() -> None:
+    """By the rule of the run's figure, for winches that the scene stops, and that samples do."""
+    campaign = with_motors(made_campaign(6))
+    assert campaign["cables_lower_winch_stop_time"].values[:2].tolist() == ["3.0", "none"]
+    campaign["cables_lower_winch_stop_time"].attrs["path"] = "cables.lower.winch.stop_time"
+    campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
+    lower = margin(campaign).axes[1]
+    ends = []
+    for line in lower.lines[:6]:
+        angle, known = line.get_xdata(), np.isfinite(line.get_ydata())
+        ends.append(angle[known][-1])
+    # Samples 0, 2 and 4 stop at 3 s, and the last record before is that of 2.5 s.
+    assert ends[::2] == pytest.approx([20.0 + 16.0 * 2.5] * 3, abs=1.1)
+    assert ends[1::2] == pytest.approx([180.0] * 3)
+    (legend,) = margin(campaign).legends
+    told = " ".join(legend.get_title().get_text().split())
+    assert "Curves end where a winch stops, in 3 samples" in told
+    scene = load_scene("ring18-motor").with_values(
+        {"structure.sections": SECTIONS, "cables.upper.winch.stop_time": 2.0}
+    )
+    times = stop_times(campaign.assign_attrs(scene=scene.to_toml()))
+    assert times["winch of the upper cable"] == 2.0
+    assert times["winch of the lower cable"].tolist() == [3.0, np.inf] * 3

@@ -263,6 +263,25 @@ def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
         assert float(tick.get_text()) == pytest.approx(1e-6 * place)
 
 
+def test_a_vertical_axis_without_a_name_has_the_unit_of_its_panel_s_title():
+    figure = Figure()
+    stress, force, share = figure.subplots(1, 3)
+    for axes, title in ((stress, "Largest stress (Pa)"), (force, "Force (N)"), (share, "Share")):
+        axes.plot([0.0, 1.0], [4e6, 9e6])
+        axes.set_title(title, loc="left")
+    style.in_readable_units(figure)
+    figure.draw_without_rendering()
+    assert stress.get_title(loc="left") == "Largest stress (MPa)"
+    for axes, factor in ((stress, 1e-6), (force, 1.0), (share, 1.0)):
+        scale = float(axes.yaxis.get_offset_text().get_text() or 1.0)
+        told = [scale * float(tick.get_text()) for tick in axes.get_yticklabels()]
+        assert told == pytest.approx(factor * axes.get_yticks())
+    bare = Figure()
+    bare.suptitle("Stress (Pa)")
+    style.in_readable_units(bare)
+    assert bare.get_suptitle() == "Stress (Pa)"
+
+
 @for_each("sections", [[], [0], [1, 19], range(1, 8)])
 def test_sections_that_do_not_exist_are_refused(sections, deployed):
     with pytest.raises(ValueError, match=r"sections = .* 1\.\.18"):
@@ -377,6 +396,29 @@ def test_a_long_ending_stands_clear_of_what_is_above_the_axes(deployed):
     ending = title.get_window_extent()
     assert ending.height > 1.5 * lock.get_window_extent().height  # two lines
     assert not ending.overlaps(lock.get_window_extent())
+
+
+def test_an_ending_that_is_too_long_ends_with_a_clause(deployed):
+    why = "came to rest with 12 of 24 V-joints locked, none of the lower plane: no winch turns, and"
+    why += " within 12 s no V-joint has moved by more than 0.57 deg"
+    then = "steps of 47.2 ms at the lock at 25.3304 s are too long for shocks in the rods"
+    long = deployed.assign(outcome=int(Fate.PARTLY_DEPLOYED))
+    long.attrs = long.attrs | {"reason": f"{why}; {then}"}
+    for inches, last in ((8.0, why), (14.0, then)):
+        told = " ".join(style.heading(long, "Locks", inches)[1].split())
+        assert told.endswith(last)
+
+
+def test_the_enlarged_end_says_where_it_begins(deployed, unfinished):
+    for run in (deployed, unfinished):
+        _, close = asynchrony(run).axes
+        (told,) = (t.get_text() for t in close.texts if "enlarged" in t.get_text())
+        assert told == f"from {close.get_xlim()[0]:.3g} s on, enlarged"
+
+
+def test_angles_have_one_unit_in_all_figures_of_a_run(deployed):
+    for each, figure in figures_of(deployed):
+        assert "degree" not in words(figure), each.name
 
 
 def test_a_structure_without_joints_between_rods_is_told_what_is_not_drawn(

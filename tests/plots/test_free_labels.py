@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ringsim.plots import style
-from ringsim.plots.peaks import Peak, mark
 from ringsim.plots.rods_and_cables import rod_stress
-from ringsim.plots.run import asynchrony, energy, opening_angles
+from ringsim.plots.run import Peak, asynchrony, energy, mark, opening_angles
 from ringsim.plots.style import FREE
 
 TIMES = np.linspace(0.0, 10.0, 400)

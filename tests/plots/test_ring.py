@@ -10,6 +10,8 @@ from made_campaign import made_campaign, with_positions
 from matplotlib.collections import LineCollection
 
 from ringsim.plots.ring import facing_azimuth, instants, lines_at, ring, view
+from ringsim.scene import load_scene, scene_from_toml
+from ringsim.simulation import simulate
 
 LEFT = [*range(6), *range(12, 18)]
 """Left halves of the bars of six sections, upper plane first."""
@@ -144,6 +146,35 @@ def test_words_above_the_ring_stand_apart(title, words, failed):
     end, subject = told.get_window_extent(), head.get_window_extent()
     bar = next(text for text in axes.texts if text.get_text().endswith(" m")).get_window_extent()
     assert bar.y1 < end.y0 < end.y1 < subject.y0 < subject.y1 <= figure.bbox.y1
+
+
+@pytest.mark.parametrize("computed", [True, False])
+def test_the_spacecraft_is_drawn_where_it_is_fixed(computed):
+    """At its centre of mass, on a line from the boom's upper end; computed it turns with that."""
+    craft = {"mass": 20.0, "inertia": [3.0, 3.0, 2.0], "centre": [0.3, 0.0, 0.8]}
+    values = {
+        "structure.sections": 3, "spacecraft": craft, "solver.end_time": 0.4,
+        "record.reactions": True, "record.positions": computed, "record.interval": 0.1,
+    }  # fmt: skip
+    run = simulate(load_scene("ring18-cable").with_values(values))
+    turn = np.array([0.0, 0.0, 90.0])[:, None] * (run["time"].values > 0.0)
+    run["base_rotation"] = run["base_rotation"].copy(data=turn)
+    figure = ring(run)
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"spacecraft", "from the boom's upper end to it"} <= {*told}
+    shots = [c for c in figure.axes[0].collections if isinstance(c, LineCollection)]
+    scene = scene_from_toml(run.attrs["scene"], source="test")
+    for number, shot in enumerate(shots):
+        away = [0.0, 0.3, 0.8] if computed and number else craft["centre"]
+        wanted, _ = view(np.array(away), facing_azimuth(scene), 24.0)
+        widths = shot.get_linewidths() / np.max(shot.get_linewidths())
+        (arm,) = np.flatnonzero(np.isclose(widths, 2.0 / 11.0))
+        ends = shot.get_segments()[arm]
+        assert ends[1] - ends[0] == pytest.approx(wanted, abs=1e-9)
+        body = shot.get_segments()[int(np.argmax(widths))]
+        assert body[0] == pytest.approx(ends[1], abs=1e-9)
+    bare = load_scene("ring18-cable").with_values({"structure.sections": 3, "solver.end_time": 0.2})
+    assert "spacecraft" not in [t.get_text() for t in ring(simulate(bare)).legends[0].get_texts()]
 
 
 def test_a_ring_that_folds_is_not_called_stowed(scene_of, made_run):

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from ringsim.analysis.design import placement
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.plots.campaign.frame import in_lines
+from ringsim.plots.campaign.numbers import distributions
 from ringsim.plots.campaign.tornado import bars_of, explained, tornado
 from ringsim.sampling.designs.blocks import Morris, Saltelli
 from ringsim.sampling.designs.independent import RandomDesign
@@ -158,3 +159,51 @@ def test_what_differs_by_less_than_its_numerical_error_has_no_sheet() -> None:
     one["peak_tension_error"] = "sample", np.full(200, 5.0), {"units": "N"}
     assert not explained(one)
     assert [*bars_of(one)] == []
+
+
+def test_what_has_no_panel_for_want_of_differences_has_no_bars() -> None:
+    """As distributions, which leave it out by the same rule and with the same words."""
+    campaign = made(RandomDesign(samples=200))
+    said = {"long_name": "power of a motor", "units": "W"}
+    campaign["peak_motor_power"] = 3.0 - 1e-3 * campaign["force"].assign_attrs(said)
+    told = "Not drawn, because samples differ by less than 0.1 %"
+    for figure in (tornado(campaign), distributions(campaign)):
+        titles = [axes.get_title(loc="left") + axes.get_xlabel() for axes in figure.axes]
+        assert not any("Power of a motor" in title for title in titles)
+        below = figure.get_supxlabel() + "".join(
+            each.get_title().get_text() for each in figure.legends
+        )
+        assert f"{told}, or than their numerical error: peak_motor_power." in " ".join(
+            below.split()
+        )
+    assert "peak_motor_power" in dict(bars_of(campaign))
+    limit = {"peak_motor_power": {"max": 4.0, "probability": 0.9, "confidence": 0.9}}
+    campaign.attrs["requirements"] = json.dumps(limit)
+    assert any("Power" in axes.get_title(loc="left") for axes in tornado(campaign).axes)
+
+
+def test_what_has_no_partial_correlation_has_its_plain_one_beside_the_index() -> None:
+    """One of more places than samples: it is significant by its rank correlation."""
+    campaign = made_campaign(40)
+    stream = np.random.default_rng(2)
+    friction = stream.random((40, 60))
+    about = campaign["cables_upper_friction_coefficient"].attrs
+    campaign = campaign.drop_vars("cables_upper_friction_coefficient")
+    campaign["cables_upper_friction_coefficient"] = ("sample", "pulley"), friction, about
+    campaign["rods_young_modulus"][:] = modulus = stream.random(40)
+    campaign["cables_lower_winch_stop_time"][:] = ["none"] * 40
+    campaign["peak_tension"][:] = 10.0 + 2.0 * modulus + 2.0 * friction[:, 0]
+    bars = dict(bars_of(campaign))["peak_tension"]
+    assert bars.measure == "given_data_index"
+    alone = np.isnan(bars.inside)
+    assert alone.tolist() == np.isfinite(bars.plain).tolist()
+    assert alone.any()
+    assert not alone.all()
+    assert np.isnan(bars.plain_ends[~alone]).all()
+    (place,) = np.flatnonzero(alone)
+    ranks = [np.argsort(np.argsort(x)) for x in (friction[:, 0], campaign["peak_tension"].values)]
+    assert bars.plain[place] == pytest.approx(np.corrcoef(*ranks)[0, 1])
+    figure = tornado(campaign)
+    (axes,) = (a for a in figure.axes if a.get_title(loc="left").startswith("Largest tension"))
+    (drawn,) = (c for c in axes.containers if c.get_label() == "rank correlation")
+    assert drawn.patches[place].get_width() == pytest.approx(bars.plain[place])

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.quick
 
 ROOT = Path(__file__).parents[2]
 CAMPAIGNS = sorted((ROOT / "campaigns").glob("*.toml"))
+CAMPAIGNS += sorted((ROOT / "campaigns" / "stand").glob("flight_*.toml"))
 SCENE = tomllib.loads(builtin_scenes()["ring18-cable"])
 CAMPAIGN = tomllib.loads((ROOT / "campaigns" / "faults.toml").read_text(encoding="utf-8"))
 

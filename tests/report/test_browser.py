@@ -8,12 +8,18 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from made_campaign import made_campaign, with_positions
 
+from read_page import Page
+from ringsim.analysis.intervals import quantities
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import sections
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.outputs.family import VARIABLES
 from ringsim.plots import figures
 from ringsim.report.page import page
 from ringsim.shapes import COMPUTED, FROM_ANGLES
@@ -189,6 +195,40 @@ def test_tables_are_whole_on_a_wide_page_and_scroll_in_their_box_on_a_narrow_one
     assert (seen["boxes"]["statistics-table"] <= 0) == (width == 1400)
     assert width == 500 or seen["room"] >= 1200  # px: numbers with error bars take 1100
     assert min(seen["cells"]) >= 200  # px: some words a line
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
+def test_a_table_of_many_columns_is_parted_and_says_where_there_is_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Single changes with 18 outputs: on 1200 px, and by its widest part on the width of paper."""
+    monkeypatch.setattr(figures, "PICTURES", [])
+    campaign = made_campaign(6, stalled=(3,))
+    campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
+    names = [n for n, v in VARIABLES.items() if v.summary and v.dtype == "f8" and n in quantities()]
+    for k, name in enumerate(n for n in names if n not in campaign):
+        told = {"units": VARIABLES[name].units, "long_name": name}
+        campaign[name] = "sample", 1.23456 * 10.0**-k * (1.0 + np.arange(6)), told
+    text = page(campaign, "runs/made").replace("</body>", MEASURE, 1)
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
+         "--window-size=1200,900", f"--user-data-dir={tmp_path / 'profile'}",
+         (tmp_path / "page.html").as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    held = re.search(r'data-seen="([^"]*)"', done.stdout)
+    assert held is not None
+    boxes = json.loads(held[1].replace("&quot;", '"'))["boxes"]
+    parts = {name: more for name, more in boxes.items() if name.startswith("matters-table")}
+    assert len(parts) >= 2
+    assert max(parts.values()) <= 0
+    cells = Page(text).cells
+    (case,) = sections(analyse(campaign), "runs/made")["matters"].tables
+    assert len(case.head) > 12
+    assert cells.count(case.head[1]) == len(parts)
+    for row in case.rows:
+        assert set(row) <= set(cells)
 
 
 def test_without_a_browser_nothing_is_begun(

@@ -153,6 +153,19 @@ def test_what_is_over_counts_on_in_the_courses(both: tuple[xr.Dataset, xr.Datase
     assert "After its end a run counts on" in figure.legends[0].get_title().get_text()
 
 
+def test_a_sample_that_runs_on_ends_no_axis_of_a_comparison() -> None:
+    one, other = made_campaign(30, stalled=(7,)), made_campaign(30)
+    late = np.arange(30) == 7
+    one["deployment_time"][:] = np.where(late, np.nan, 4.0)
+    one["final_time"][:] = np.where(late, 10.0, 4.0)
+    other["deployment_time"][:], other["final_time"][:] = 6.0, 6.0
+    found = compare(one, other, ("ground", "flight"))
+    drawn = {name: figure for name, _, figure in figures_of_both(found, one, other)}
+    assert drawn["courses"].axes[0].get_xlim() == pytest.approx((0.0, 6.0))
+    told = drawn["courses"].legends[0].get_title().get_text()
+    assert told.endswith("\nground: 1 sample goes on, until 10 s.")
+
+
 def test_samples_that_were_cut_off_are_told_and_what_differs_comes_first(
     both: tuple[xr.Dataset, xr.Dataset],
 ) -> None:
@@ -172,6 +185,23 @@ def test_titles_of_figures_fit_their_sheets(both: tuple[xr.Dataset, xr.Dataset])
         (title,) = (text for text in figure.texts if text.get_weight() == "bold")
         for text in (title, *(axes.title for axes in figure.axes)):
             assert text.get_window_extent().x1 < figure.bbox.x1
+
+
+def test_what_is_nearly_the_same_in_both_has_no_panel(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    """Its differences would be those of the last digits that tables give."""
+    one, other = (each.copy(deep=True) for each in both)
+    for each, power in ((one, 3.0), (other, 3.001)):
+        values = power + 1e-4 * np.arange(8.0)
+        each["peak_motor_power"] = "sample", values, {"units": "W", "long_name": "motor power"}
+    for _, _, figure in itertools.islice(figures_of_both(compare(one, other), one, other), 2):
+        assert not any("Motor power" in axes.get_xlabel() for axes in figure.axes)
+        told = " ".join(figure.legends[0].get_title().get_text().split())
+        assert told == "Not drawn, because samples differ by less than 0.1 %: peak_motor_power"
+    other["peak_motor_power"] += 0.01
+    drawn = {name: each for name, _, each in figures_of_both(compare(one, other), one, other)}
+    assert any("Motor power" in axes.get_xlabel() for axes in drawn["values"].axes)
 
 
 def test_differences_have_their_unit_and_labels_stand_apart(

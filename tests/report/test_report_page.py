@@ -178,11 +178,27 @@ def test_samples_that_ended_alike_share_a_row_and_words_have_no_unit() -> None:
     campaign = made_campaign(30, failed=(2,), stalled=tuple(range(5, 30)))
     rows, more = tables.failures(campaign, "made")
     assert [row[1] for row in rows] == ["failed: timeout (time limit)", "stalled"]
-    assert rows[1][0] == ", ".join(map(str, range(5, 25))) + " and 5 more"
+    assert [row[0] for row in rows] == [
+        "sample 2", f"samples {', '.join(map(str, range(5, 25)))} and 5 more",
+    ]  # fmt: skip
     assert (rows[1][-1], more) == ("ringsim replay made 5", 0)
     assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "s"
     campaign["cables_lower_winch_stop_time"].attrs.pop("units")  # as of words alone
     assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "-"
+
+
+def test_how_runs_ended_is_not_told_twice() -> None:
+    """Of three samples the worst ones tell it; of four one more would be missing."""
+    for stalled in ((5,), (5, 6, 7), (4, 5, 6, 7)):
+        campaign = made_campaign(8, stalled=stalled)
+        campaign["reason"] = campaign["reason"].astype(object)
+        campaign["reason"][list(stalled)] = "no V-joint moves; steps of 43 ms are long"
+        text = page(campaign, "made")
+        told = [cell for cell in Page(text).cells if "no V-joint moves" in cell]
+        assert ("failures-table" in text) == (len(stalled) == 4)
+        assert "No run ended short of its goal" not in text
+        # Both the requirement on the time and the outcome fail, by samples and for one reason.
+        assert len([each for each in told if "43 ms" not in each]) == min(len(stalled), 3)
 
 
 def test_every_value_of_the_scene_has_its_origin(made: tuple[str, xr.Dataset, str]) -> None:

@@ -27,6 +27,11 @@ EXAMPLES = {
         "low": 1.0,
         "high": 4.0,
     },
+    "calibrated": {
+        "of": {"kind": "normal", "mean": 3.0, "standard_deviation": 2.0},
+        "shift": 0.5,
+        "remaining_scatter": 0.25,
+    },
     "discrete": {"values": [1.0, 2.0, 5.0], "probabilities": [0.5, 0.2, 0.3]},
 }
 
@@ -46,6 +51,8 @@ def reference(kind):
             return stats.uniform(-1.0, 5.0)
         case "truncated":
             return stats.truncnorm(-1.0, 0.5, loc=3.0, scale=2.0)
+        case "calibrated":
+            return stats.norm(4.0, 0.5)
 
 
 def test_every_kind_has_an_example():

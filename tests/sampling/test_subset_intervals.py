@@ -11,7 +11,7 @@ from ringsim.analysis.tails import DISAGREE, agreement, bound_of_first_levels, r
 from ringsim.cable.friction import BearingFriction
 from ringsim.rigid.drive import Drive
 from ringsim.rigid.mechanism import Mechanism
-from ringsim.sampling.subset_levels import Answer, Repetition, simulation_of
+from ringsim.sampling.designs.levels import Answer, Repetition, simulation_of
 from ringsim.scene import load_scene
 
 AXES = 18

@@ -9,8 +9,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import norm
 
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.levels import SubsetSimulation
-from ringsim.sampling.subset_levels import variance_of_level
+from ringsim.sampling.designs.levels import SubsetSimulation, variance_of_level
 
 AXES = dict.fromkeys("abcdefgh")
 

@@ -131,6 +131,8 @@ def test_faults_name_them() -> None:
          'did you mean "section 2 V to second hinge"?'),
         ({"faults": [{"kind": "cut-cable", "time": 1.0, "cable": 3, "span": "section 2 V"}]},
          "faults[1].cable = 3 must be at most 2"),
+        ({"faults": [{"kind": "cut-cable", "time": 1.0, "cable": "middle", "span": 2}]},
+         'faults[1].cable = "middle" must be "upper", "lower", 1 or 2'),
         ({"cables": "none", "faults": [{"kind": "cut-cable", "time": 1.0, "span": "x"}]},
          "is a fault of a cable, but the scene has none"),
     ],

@@ -329,6 +329,28 @@ def test_a_scene_file_without_its_ending_is_suggested(tmp_path: Path) -> None:
     )
 
 
+def test_a_scene_file_that_is_misspelt_is_suggested_before_a_built_in_scene(tmp_path: Path) -> None:
+    (tmp_path / "ring12.toml").write_text(load_scene("ring18").to_toml())
+    with pytest.raises(InputError, match=r"did you mean \S*/ring12\.toml\?"):
+        load_scene(tmp_path / "ring13.toml")
+    with pytest.raises(InputError, match=r"did you mean ring18\?"):
+        load_scene(Path("rong18"))
+
+
+def test_refusals_of_campaigns_tell_the_cure(tmp_path: Path) -> None:
+    """A normal friction goes below zero; percents are no probabilities."""
+    path = tmp_path / "mine.toml"
+    law = '{ kind = "normal", mean = -0.02, standard_deviation = 0.002 }'
+    path.write_text(f'{CAMPAIGN}"joints.vjoint.coulomb" = {law}\n')
+    line = refused("campaign", path, "--dry-run")
+    assert re.search(r"joints\.vjoint\.coulomb = -0\.\d{1,11} N m must be at least 0 N m: ", line)
+    assert line.endswith('draw it with kind = "truncated", low = 0, of = { kind = "normal", ... }')
+    wanted = "[requirements]\nasynchrony_max = { max = 9.0, probability = 95, confidence = 0.9 }"
+    path.write_text(f"{CAMPAIGN}\n{wanted}\n")
+    line = refused("campaign", path, "--dry-run")
+    assert line.endswith("probability = 95 must be below 1; 95 % are 0.95")
+
+
 @for_each(
     ("values", "text"),
     [
@@ -351,3 +373,31 @@ def test_a_scene_file_without_its_ending_is_suggested(tmp_path: Path) -> None:
 def test_a_refusal_of_a_part_tells_value_and_cure(values: dict[str, object], text: str) -> None:
     with pytest.raises(InputError, match=re.escape(text)):
         load_scene("ring18-motor").with_values(values)
+
+
+@for_each(
+    ("value", "words"),
+    [
+        ("cables.upper.pulley_radius=0.3", "pulley_radius = 0.3 m is larger than the shortest rod"),
+        ("cables.lower.winch.winding.drum_radius=2.0", "winding.drum_radius = 2 m is larger than"),
+        ("cables.upper.winch.start_time=500.0", "start_time = 500 s is after solver.end_time"),
+        ("cables.lower.winch.stop_time=500.0", "stop_time = 500 s is after solver.end_time"),
+        (
+            'faults=[{kind="stuck-vjoint",section=2,time=500.0}]',
+            "faults[1].time = 500 s is after",
+        ),
+        (
+            "structure.corner_mass=50.0",
+            "structure.corner_mass: corners of 1800 kg on rods of 1.287",
+        ),
+    ],
+)
+def test_values_that_nobody_means_are_told_and_not_refused(value: str, words: str) -> None:
+    """Half a bar of ring18 has 0.289 m, its rods weigh 1.287 kg; a scene as it is has none."""
+    for more in ([], ["--set", value]):
+        told = CliRunner().invoke(cli, ["check", "ring18-motor", *more])
+        assert told.exit_code == 0, told.output
+        lines = [line for line in told.output.splitlines() if line.startswith("doubtful: ")]
+        assert len(lines) == bool(more)
+        assert all(words in line for line in lines), lines
+        assert told.output.splitlines()[-1].startswith("valid")

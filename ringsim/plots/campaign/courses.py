@@ -1,5 +1,6 @@
 """Courses of all samples of a campaign: the fan, lags by section, the order of locks."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from ringsim.plots.campaign.frame import (
     lines_told,
     looks_of_cases,
     of_cases,
+    shown_until,
 )
 from ringsim.plots.registry import picture
 from ringsim.plots.run import LEAST_SPAN
@@ -51,7 +53,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     ``campaign`` has ``opening_angle`` (sample, plane, section, time).  The sample with the largest
     asynchrony is drawn on its own.  ``read`` is what ``courses`` gives, if it is there already.
     """
-    read = courses(campaign) if read is None else read
+    read, ran_on = _shown(campaign, courses(campaign) if read is None else read)
     found = read.bands
     planes, sections = found["plane"].values.tolist(), found["section"].values.tolist()
     looks = dict(zip(planes, _LOOKS, strict=False))
@@ -117,8 +119,15 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     if cases:
         some = f" {len(cases)} of them are drawn." * (len(cases) < len(read.samples))
         note = f"{(some + lines_told(campaign)).strip()} {note}"
-    head(figure, campaign, "Ahead and behind", f"{told(campaign, len(read.samples))}. {note}")
+    note = f"{told(campaign, len(read.samples))}. {note}{ran_on}"
+    head(figure, campaign, "Ahead and behind", note)
     return figure
+
+
+def _shown(campaign: xr.Dataset, read: Courses) -> tuple[Courses, str]:
+    """Courses up to where nearly all samples are over, and a sentence on the others."""
+    until, ran_on = shown_until(campaign)
+    return replace(read, bands=read.bands.sel(time=read.bands["time"] <= until)), ran_on
 
 
 def _cases(
@@ -161,7 +170,7 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     or the base case of single changes, beside the sample with the largest asynchrony, with one
     colour scale.  ``read`` is what ``courses`` gives, if it is there already.
     """
-    read = courses(campaign) if read is None else read
+    read, ran_on = _shown(campaign, courses(campaign) if read is None else read)
     found = read.bands
     worst, one = _worst(campaign, read)
     columns = [("median of all samples", read.median)]
@@ -185,7 +194,7 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     bar.set_label(style.label(found, width=30), fontsize=9)
     grid[0, 0].yaxis.set_major_locator(MaxNLocator(10, integer=True, min_n_ticks=1))
     figure.supylabel(style.label(campaign["section"]), fontsize=10.5)
-    head(figure, campaign, "Lag map", f"{told(campaign, len(read.samples))}.")
+    head(figure, campaign, "Lag map", f"{told(campaign, len(read.samples))}.{ran_on}")
     return figure
 
 

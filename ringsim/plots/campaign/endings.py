@@ -24,9 +24,11 @@ from ringsim.plots.campaign.frame import (
     looks_of,
     looks_of_cases,
     of_cases,
+    shown_until,
 )
-from ringsim.plots.drives_and_locks import least_rate, standard_of
+from ringsim.plots.drives_and_locks import least_rate, standard_of, stop_times
 from ringsim.plots.registry import picture
+from ringsim.tables import counted as number_of
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
 
@@ -86,16 +88,18 @@ def bands_by_ending(
 
 def over_time(
     figure: Figure, panels: Sequence[Axes], campaign: xr.Dataset, curves: Sequence[Array],
-    words: NDArray[np.str_], cases: Looks,
+    words: NDArray[np.str_], cases: Looks, until: float,
 ) -> None:  # fmt: skip
-    """A panel a set of curves (sample, time), up to the last time at which any is known."""
+    """A panel a set of curves (sample, time), up to the last time at which any is known, and not
+    beyond one, s.
+    """
     time = campaign["time"].to_numpy()
     last = 0
     for axes, values in zip(panels, curves, strict=True):
         bands_by_ending(axes, time, values, words, cases)
         if (known := np.flatnonzero(np.isfinite(values).any(axis=0))).size:
             last = max(last, int(known[-1]))
-    panels[0].set_xlim(time[0], time[max(last, 1)])
+    panels[0].set_xlim(time[0], min(time[max(last, 1)], until))
     panels[-1].set_xlabel(style.label(campaign["time"]))
     legend(figure, panels, 4)
 
@@ -119,12 +123,15 @@ def base_load(campaign: xr.Dataset) -> Figure:
         axes.set_ylabel(style.label(parts.assign_attrs(long_name=text), width=30))
         style.span_sizes(axes, curves[-1])
     cases = looks_of_cases(campaign, read["sample"].values)
-    over_time(figure, panels, read, curves, words, cases)
-    note = f"{counted(campaign, words)} At recorded times: peaks may be higher."
+    until, ran_on = shown_until(campaign)
+    over_time(figure, panels, read, curves, words, cases, until)
+    note = f"{counted(campaign, words)}{ran_on} At recorded times: peaks may be higher."
     head(figure, campaign, "What the base carries", note)
     return figure
 
 
+_ZERO: dict[str, Any] = {"color": style.INK, "linewidth": 1.2, "linestyle": (0, (1, 1.5))}
+"""Look of a margin of 0: unlike any median's, whose dashes are longer."""
 _GOLDEN = 0.618034
 """Multiples of it fill a row evenly, whatever the number of marks."""
 _ANGLES = 161
@@ -136,7 +143,7 @@ _ANGLES = 161
 )  # fmt: skip
 def margin(campaign: xr.Dataset) -> Figure:
     """``least_drive_margin`` (sample) by ending; below, ``drive_margin`` (sample, time) over the
-    mean opening angle.
+    mean opening angle, as long as no winch has stopped: see ``stop_times``.
     """
     figure = Figure(figsize=(8.6, 6.2))
     upper, lower = figure.subplots(2, 1, height_ratios=(2, 3))
@@ -144,16 +151,24 @@ def margin(campaign: xr.Dataset) -> Figure:
     _strips(upper, campaign, samples, values)
     read, words = chosen(campaign, ["drive_margin", "opening_angle"])
     angles = read["opening_angle"].mean(("plane", "section")).transpose("sample", "time").to_numpy()
-    margins = read["drive_margin"].transpose("sample", "time").to_numpy()
-    rows = [_over_angle(*each) for each in zip(angles, margins, strict=True)]
+    margins = read["drive_margin"].transpose("sample", "time")
+    stops = stop_times(campaign.sel(sample=read["sample"])).values()
+    first = np.min(np.broadcast_arrays(np.full(len(words), np.inf), *stops), axis=0)
+    after = margins.notnull() & (read["time"] >= xr.DataArray(first, dims="sample"))
+    rows = [_over_angle(*each) for each in zip(angles, margins.where(~after).values, strict=True)]
     grid = angle_grid(rows)
     laid = np.array([laid_on(grid, *row) for row in rows])
     bands_by_ending(lower, grid, laid, words, looks_of_cases(campaign, read["sample"].values))
     style.margin_axis(lower, np.append(laid, values.min()), f"Margin by {standard_of(campaign)}")
-    lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    lower.axhline(0.0, **_ZERO)
     lower.set_xlabel("Mean opening angle (deg)")
     legend(figure, [lower], 4)
-    note = f"{counted(campaign, words)} Dashed: the margin of 0 that the standard requires."
+    note = f"{counted(campaign, words)} Dotted: the margin of 0 that the standard requires."
+    if cut := int(after.any("time").sum()):
+        note += (
+            f" Curves end where a winch stops, in {number_of(cut, 'sample')}: it holds its "
+            "plane, and there is no margin any more."
+        )
     head(figure, campaign, "Drive margin", note)
     return figure
 
@@ -176,7 +191,7 @@ def _strips(axes: Axes, campaign: xr.Dataset, samples: Array, values: Array) -> 
                       color=style.VERMILLION, fontsize=9,
                       xycoords=axes.get_xaxis_transform())  # fmt: skip
     if values.size and values.min() < 0.0 < values.max():
-        axes.axvline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+        axes.axvline(0.0, **_ZERO)
     axes.set_xlabel(style.label(campaign["least_drive_margin"]))
 
 
@@ -234,9 +249,10 @@ def motors(campaign: xr.Dataset) -> Figure:
             axes.set_title(name, fontsize=9.5)
             axes.set_ylabel(style.label(read[what], width=22), fontsize=9)
     cases = looks_of_cases(campaign, read["sample"].values)
-    over_time(figure, grid.ravel().tolist(), read, curves, words, cases)
+    until, ran_on = shown_until(campaign)
+    over_time(figure, grid.ravel().tolist(), read, curves, words, cases, until)
     grid[-1, 0].set_xlabel(style.label(read["time"]))
-    head(figure, campaign, "Motors", counted(campaign, words))
+    head(figure, campaign, "Motors", counted(campaign, words) + ran_on)
     return figure
 
 
@@ -280,7 +296,7 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
                          label=f"latches catch from {least:.3g} rad/s on")  # fmt: skip
         axes.set_title(f"{plane} plane", fontsize=9.5)
         axes.grid(visible=False, axis="x")
-    grid[0].set_ylim(bottom=0.0)
+    style.from_zero(grid[0])
     grid[0].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)
     grid[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     grid[-1].set_xlabel(style.label(campaign["section"]))
@@ -340,7 +356,9 @@ def tension(campaign: xr.Dataset) -> Figure:
         style.draw_limit(axes, limit, f"limits.tension = {limit:g} N")
         axes.set_title(f"{plane} cable", fontsize=9.5)
         axes.xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
-    grid[0].set_ylim(bottom=0.0)  # all panels share it
+    style.from_zero(grid[0])  # all panels share it
+    spans = found["span"].values
+    grid[0].set_xlim(spans[0] - 0.6, spans[-1] + 0.6)  # there is no span 0
     grid[-1].set_xlabel(style.label(campaign["span"]))
     figure.supylabel(style.label(found.assign_attrs(long_name="largest recorded tension")),
                      fontsize=10.5)  # fmt: skip

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ringsim.analysis.courses import QUANTILES
+from ringsim.analysis.courses import QUANTILES, ends
 from ringsim.analysis.design import (
     called,
     endings,
@@ -22,9 +22,10 @@ from ringsim.analysis.design import (
     scalars,
     values_of,
 )
-from ringsim.analysis.intervals import quantities, used, varies
+from ringsim.analysis.intervals import good, quantities, tells_of, used, varies
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import losses, one_at_a_time
+from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
 
 LOOKS = {
@@ -60,7 +61,9 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
     if (lost := losses(campaign)).note:
         subject += lost.mark
         caption += f"\n{lost.mark.strip()} {lost.note[0].upper()}{lost.note[1:]}."
-    words = "\n".join(textwrap.fill(each, int(12.0 * inches)) for each in caption.split("\n"))
+    held = caption.replace(" %", f"{style.FIXED}%")
+    words = "\n".join(textwrap.fill(each, int(12.0 * inches)) for each in held.split("\n"))
+    words = words.replace(style.FIXED, " ")
     figure.set_figheight(figure.get_figheight() + _LINE * max(0, words.count("\n") - 1))
     name = str(campaign.attrs.get("title", "")).strip()
     style.title(figure, textwrap.fill(f"{subject}: {name}".rstrip(": "), int(10.3 * inches)))
@@ -86,9 +89,24 @@ def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
     return wanted[name].limits if name in wanted else []
 
 
+def at_or_below(campaign: xr.Dataset, name: str) -> tuple[Array, Array]:
+    """Values of a number in order, and the share of samples at or below none of them, the first,
+    the second, ..., one more than there are values.
+
+    Samples that ended before what it is about happened count as worse than all values: below them
+    where small ones are bad, or a requirement forbids these alone.
+    """
+    values = np.sort(values_of(campaign, name)[1])
+    of = int(tells_of(campaign, name).sum())
+    forbidden = [word for word, _ in limits(campaign, name)]
+    small_is_bad = forbidden == ["min"] if forbidden else VARIABLES[name].badness < 0
+    below = (of - len(values)) * small_is_bad
+    return values, (below + np.arange(len(values) + 1)) / max(of, 1)
+
+
 MOST_PANELS = 9
 """Of a sheet: more could not be read."""
-_APART = 1e-3
+APART = 1e-3
 """Range of a number over its size below which a panel of its own shows nothing: no digit of it that
 tables give changes."""
 
@@ -107,21 +125,28 @@ def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tupl
         if name in campaign and name in quantities() and name not in names
         and len(values_of(campaign, name)[1])
     ]  # fmt: skip
-    known = {name: values_of(campaign, name)[1] for name in names}
-    several = [name for name in names if name not in limited and len(known[name]) > 1]
-    flat = [
-        name for name in several
-        if np.ptp(known[name]) < _APART * np.abs(known[name]).max() or not varies(campaign, name)
-    ]  # fmt: skip
-    told = ""
-    if flat and len(flat) < len(names):
-        within = f"by less than {100 * _APART:g} %, or than their numerical error"
-        told = f" Not drawn, because samples differ {within}: {', '.join(flat)}."
-        names = [name for name in names if name not in flat]
+    flat, told = still(campaign, names)
+    names = [name for name in names if name not in flat]
     if len(names) > most:
         names.sort(key=lambda name: name not in limited)
         told += f" Not drawn for want of room: {what}{', '.join(names[most:])}."
     return names[:most], told
+
+
+def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
+    """Those of some numbers that differ so little between samples that no figure shows it, and a
+    sentence that says so; none if all do, or where something is required of them.
+    """
+    limited = required_by(campaign.attrs)
+    known = {name: values_of(campaign, name)[1] for name in names if name not in limited}
+    flat = [
+        name for name, values in known.items() if len(values) > 1
+        and (np.ptp(values) < APART * np.abs(values).max() or not varies(campaign, name))
+    ]  # fmt: skip
+    if not flat or len(flat) == len(names):
+        return [], ""
+    within = f"by less than {100 * APART:g} %, or than their numerical error"
+    return flat, f" Not drawn, because samples differ {within}: {', '.join(flat)}."
 
 
 def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:
@@ -144,6 +169,24 @@ def entries(figure: Figure, handles: Sequence[Any], words: Sequence[str], column
 
 _LETTER, _HANDLE = 0.085, 0.65
 """Widths in inch of a letter of a legend, and of its line and the blanks around it."""
+
+
+_NEARLY_ALL, _FURTHER = 0.95, 1.25
+"""Share of the samples that are over where time axes may end, and how much later they do."""
+
+
+def shown_until(campaign: xr.Dataset) -> tuple[float, str]:
+    """Time (s) up to which courses are drawn, and a sentence on samples that ran on: a few that
+    stall need not squeeze all others.  Infinity and nothing where no sample does.
+    """
+    if not {"final_time", "deployment_time"} <= set(campaign.data_vars):
+        return np.inf, ""
+    over = ends(campaign)[good(campaign)]
+    until = _FURTHER * np.quantile(over, _NEARLY_ALL, method="higher") if over.size else np.inf
+    if not (later := int((over > until).sum())):
+        return np.inf, ""
+    left = "1 sample goes" if later == 1 else f"{later} samples go"
+    return float(until), f" Time ends at {until:.3g} s: {left} on, until {over.max():.4g} s."
 
 
 def bands(values: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -1,5 +1,6 @@
 """Main numbers of all samples: distributions, convergence, by input, the tail."""
 
+import math
 import textwrap
 from collections.abc import Mapping
 from typing import Any
@@ -32,6 +33,7 @@ from ringsim.plots import style
 from ringsim.plots.campaign.frame import (
     MOST_PANELS,
     WIDE,
+    at_or_below,
     head,
     in_lines,
     legend,
@@ -61,42 +63,30 @@ def _spread(campaign: xr.Dataset) -> bool:
     return bool(scalars(campaign)) and not reached(campaign) and not is_one_by_one(campaign)
 
 
-def points(values: Array, of: int) -> tuple[Array, Array]:
-    """Quantiles of ``_LEVELS`` and their levels, of so many samples of which some have no value.
-
-    Those count as beyond all values; quantiles that lie among them are left out.
-    """
-    # Places among all, as places among those that have a value.
-    places = np.array(_LEVELS) * (of - 1) / max(len(values) - 1, 1)
-    known = places <= 1.0
-    return quantile(values, places[known].tolist()), np.array(_LEVELS)[known]
-
-
 @picture(
     "campaign", 30, "Cumulative distribution of each main number, with its limits", applies=_spread
 )
 def distributions(campaign: xr.Dataset) -> Figure:
-    """Share of the samples at or below each value, a step a sample; dots at 5, 50 and 95 % of those
-    of a population.
+    """Share of the samples at or below each value, a step a sample; dots at the quantiles of 5, 50
+    and 95 % of those of a population, which are of the values alone, as in tables.
 
-    Samples whose run ended before what a number is about happened count, too, as they do in
-    verdicts: their curve ends below 100 %.
+    Samples whose run ended before what a number is about happened count in the curve, too, as they
+    do in verdicts: see ``at_or_below``.
     """
     campaign, blocks = standing(campaign)
     names, flat = shown(campaign)
     figure, panels, columns = style.new_panels(len(names), 3.7, 3.0, 0.9)
     short, limited = False, any(limits(campaign, name) for name in names)
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
-        values = np.sort(values_of(campaign, name)[1])
-        of = int(tells_of(campaign, name).sum())
-        short = short or len(values) < of
-        share = np.arange(1, len(values) + 1) / of
+        values, share = at_or_below(campaign, name)
+        short = short or share[0] > 0.0 or share[-1] < 1.0
         kept = np.unique(np.linspace(0, len(values) - 1, min(len(values), _STEPS)).astype(int))
-        axes.step(np.append(values[:1], values[kept]), np.append(0.0, share[kept]), where="post",
-                  color=style.BLUE)  # fmt: skip
+        axes.step(np.append(values[:1], values[kept]), np.append(share[:1], share[kept + 1]),
+                  where="post", color=style.BLUE)  # fmt: skip
         if len(values) > 1 and not of_cases(campaign):
-            axes.plot(*points(values, of), "o", color=style.INK, markersize=4, clip_on=False,
-                      zorder=4)  # fmt: skip
+            heights = share[0] + np.array(_LEVELS) * (share[-1] - share[0])
+            axes.plot(quantile(values, _LEVELS), heights, "o", color=style.INK, markersize=4,
+                      clip_on=False, zorder=4)  # fmt: skip
         for word, limit in limits(campaign, name):
             axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (5, 2)), linewidth=1.3)
             # Above the frame, where no curve runs.
@@ -114,12 +104,12 @@ def distributions(campaign: xr.Dataset) -> Figure:
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
     most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
-    dots = "" if of_cases(campaign) else " Dots: quantiles of 5, 50 and 95 %."
+    dots = "" if of_cases(campaign) else " Dots: quantiles of 5, 50 and 95 % of the values."
     notes = f"{dots}{blocks}{flat}"
     if short:
         notes += (
-            " Where a curve ends below 100 %, it did not happen in the other samples: they count "
-            "as beyond all values, and violate limits."
+            " Where a curve begins above 0 % or ends below 100 %, it did not happen in the other "
+            "samples: they count as worse than all values, and violate limits."
         )
     head(figure, campaign, "Distributions", f"{told(campaign, most)}.{notes}")
     return figure
@@ -276,7 +266,7 @@ def _has_run(campaign: xr.Dataset) -> bool:
 
 def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     """An input as one number a sample: the mean of its places, or the place of its word in the
-    list that comes second, which is empty for numbers.
+    list that comes second, which is empty for numbers: numbers by size, then words.
     """
     values = variable.to_numpy()
     if values.dtype.kind not in "OU":
@@ -284,8 +274,16 @@ def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
         return (numbers if numbers.ndim == 1 else numbers.mean(axis=1)), []
     rows = values.reshape(len(values), -1).astype(str)
     texts = np.array([", ".join(dict.fromkeys(row.tolist())) for row in rows])
-    words, places = np.unique(texts, return_inverse=True)
-    return places.astype(float), words.tolist()
+    place = {word: k for k, word in enumerate(sorted(set(texts.tolist()), key=_size))}
+    return np.array([place[text] for text in texts.tolist()], dtype=float), [*place]
+
+
+def _size(text: str) -> tuple[float, str]:
+    """By what the texts of an input that may be a word are ordered."""
+    try:
+        return float(text), text
+    except ValueError:
+        return math.inf, text
 
 
 @picture(

@@ -30,7 +30,16 @@ from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import one_at_a_time
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import MOST_PANELS, head, in_lines, legend, looks_of, moves, short
+from ringsim.plots.campaign.frame import (
+    MOST_PANELS,
+    head,
+    in_lines,
+    legend,
+    looks_of,
+    moves,
+    short,
+    still,
+)
 from ringsim.plots.registry import picture
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted, unit_behind
@@ -52,7 +61,7 @@ _INSIDE = {
 """What a second, thinner bar shows beside it."""
 _BY_CHANCE = "exceeded by chance in one case of 20"
 _MOST = 8
-_NONE = np.empty(0), np.empty((0, 2)), np.empty(0), np.empty((0, 2))
+_NONE = 3 * (np.empty(0), np.empty((0, 2)))
 
 
 class Bars(NamedTuple):
@@ -69,6 +78,9 @@ class Bars(NamedTuple):
     """Shape (bars, 2)."""
     inside: NDArray[np.floating]
     inside_ends: NDArray[np.floating]
+    plain: NDArray[np.floating]
+    """Rank correlations of what has no partial one to stand inside."""
+    plain_ends: NDArray[np.floating]
     chance: float
     """What would be reached by chance; NaN if that is not known."""
     told: str
@@ -171,9 +183,15 @@ def _bars(
         return np.full((len(order), *shape), np.nan) if found is None else found.values[order]
 
     second, _ = _INSIDE.get(measure, ("-", ""))
+    inside = of(second, ())
+    held = np.isfinite(inside)
+    # What alone goes with an output may be a place of an input whose mean is held: see influence.
+    plain = "rank_correlation" if second == "partial_rank_correlation" else "-"
     return Bars(
         measure, names[order].tolist(), values[order],
-        of(f"{measure}_interval", (2,)), of(second, ()), of(f"{second}_interval", (2,)),
+        of(f"{measure}_interval", (2,)), inside, of(f"{second}_interval", (2,)),
+        np.where(held, np.nan, of(plain, ())),
+        np.where(held[:, None], np.nan, of(f"{plain}_interval", (2,))),
         np.nan if chance is None or not len(order) else float(np.min(chance[order])), told,
     )  # fmt: skip
 
@@ -201,6 +219,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
     # Those that something is required of first: a page has no room for all.
     wanted = required_by(campaign.attrs)
     every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
+    flat, unmoved = still(population_of(campaign), scalars(campaign))
+    every = [each for each in every if each[0] not in flat]
     quiet = [name for name, bars in every if bars.measure and not bars.names]
     every = [each for each in every if each[0] not in quiet]
     found = every[:MOST_PANELS]
@@ -213,10 +233,11 @@ def tornado(campaign: xr.Dataset) -> Figure:
         _draw(axes, bars)
         known = np.isfinite(bars.ends).all(axis=1)
         certain, uncertain = certain or bool(known.any()), uncertain or not known.all()
-        words = style.label(campaign[output], width=42) if output in campaign else output
+        # Without its unit, which is not that of the bars.
+        words = style.label(campaign[output], "1", 42) if output in campaign else output
         axes.set_title(words, fontsize=9.5, color=style.INK)
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
-        unit = f" ({units})" if bars.measure == "mean_absolute_effect" and units != "1" else ""
+        unit = unit_behind("", units) if bars.measure == "mean_absolute_effect" else ""
         below = f"\n{bars.told}" if bars.told and bars.names else ""
         if bars.names:
             two = np.isfinite(bars.inside).any() and bars.measure in _INSIDE
@@ -234,15 +255,14 @@ def tornado(campaign: xr.Dataset) -> Figure:
     of = f"The longest {_MOST} bars at most{', significant inputs only' * beyond}."
     if any((np.abs(bars.values) < bars.chance).any() for _, bars in found):
         of += (
-            " Where an index ends before the dashed line, the partial rank correlation is "
-            "significant."
+            " Where an index ends before the dashed line, the correlation below it is significant."
         )
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", whiskers, of]))
     if quiet:
         caption += f" No significant input for {', '.join(quiet)}."
     if others := [name for name, _ in every[MOST_PANELS:]]:
-        caption += f" Not drawn: {', '.join(others)}."
-    head(figure, campaign, "What matters", caption)
+        caption += f" Not drawn for want of room: {', '.join(others)}."
+    head(figure, campaign, "What matters", caption + unmoved)
     return figure
 
 
@@ -256,13 +276,16 @@ def _draw(axes: Axes, bars: Bars) -> None:
         return
     measure = bars.measure
     word = MEASURES[measure][0].lower() + MEASURES[measure][1:]
-    second = bool(np.isfinite(bars.inside).any())
+    second = bool(np.isfinite([bars.inside, bars.plain]).any())
     shift = 0.17 if second else 0.0
     colour = _COLOURS.get(measure, style.SKY)
     _row(axes, height + shift, bars.values, bars.ends, colour, word, 0.34 if second else 0.6)
     if second:
         _row(axes, height - shift, bars.inside, bars.inside_ends, style.ORANGE,
              _INSIDE[measure][1], 0.34)  # fmt: skip
+    if np.isfinite(bars.plain).any():
+        _row(axes, height - shift, bars.plain, bars.plain_ends, style.PURPLE, "rank correlation",
+             0.34)  # fmt: skip
     if np.isfinite(bars.chance):
         # An index is a share: what it has below zero is its own error.
         signed = measure.endswith("rank_correlation")

@@ -6,12 +6,12 @@ import pytest
 from click.testing import CliRunner
 from loops import for_each
 
-from ringsim.calibration import opening_angle_for
 from ringsim.cli import cli
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene
 from ringsim.simulation import run
+from ringsim.stowed_angle import opening_angle_for
 from small_rings import pulled, six
 
 WANTED = 7.0
@@ -59,3 +59,13 @@ def test_what_frames_cannot_answer_is_refused() -> None:
     result = CliRunner().invoke(cli, words)
     assert result.exit_code == 2
     assert "rods.kind" in result.output
+
+
+def test_a_limit_of_stress_does_not_keep_from_looking_for_the_angle() -> None:
+    words = ["check", "ring18", "--deploys-in", "9", "--set", "structure.sections=4"]
+    plain, limited = (
+        CliRunner().invoke(cli, [*words, *more])
+        for more in ([], ["--set", "record.stress=true", "--set", "limits.rod_stress=2e8"])
+    )
+    assert limited.exit_code == 0
+    assert limited.output == plain.output

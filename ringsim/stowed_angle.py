@@ -41,7 +41,12 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         raise InputError(f"a deployment time of {time:g} s must be finite and above 0 s")
     end = min(max(_PATIENCE * time, scene.solver.step), _LONGEST)
     plain = substituted(scene).with_values(
-        {"record.stress": False, "solver.error_bars": False, "solver.end_time": end}
+        {
+            "limits.rod_stress": "none",
+            "record.stress": False,
+            "solver.error_bars": False,
+            "solver.end_time": end,
+        }
     )
     cables = [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
     # From these angles on every cable's bracket opens the ring, and no stop is in contact.

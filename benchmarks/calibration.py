@@ -1,0 +1,262 @@
+"""Are the intervals of a calibration honest?  Tests made by runs of known truth.
+
+Run: python benchmarks/calibration.py [--kind coverage | bad | sound | wrong | flight]
+         [--first N] [--tests N] [--runs N] [--file F]
+
+Each test is of a ring of six sections with two cables: truths are drawn from the priors, a run of
+the frame engine with them is read by an encoder of 0.1 deg in every V-joint at 2 Hz, and
+``ringsim.Calibration`` finds the unknowns from these readings.
+
+coverage  3 to 8 unknowns, chosen by chance.  Printed: how often the 90 and 95 % intervals hold, and
+          whether ranks of the truths in the posterior are even (chi-squared of ten classes;
+          simulation-based calibration, Talts et al. 2018).
+bad       a friction for every pulley of both cables, one of them five times the mean: how often it
+          stands out, and first.
+sound     the same without it: how often any pulley is told to stand out.
+wrong     as coverage with four unknowns, but the truth has dry friction in its V-joints, which the
+          model lacks: how often the readings are told not to be explained.
+
+flight    the unknowns of campaigns/stand, tested on the ground: the 90 % intervals of the
+          asynchrony in flight before and after, from 64 samples each, and whether they hold it.
+
+What each test gave is kept in the file (runs/calibration-KIND.json) as it comes; tests that are
+there are not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.stats
+import xarray as xr
+
+import ringsim
+from ringsim.analysis.posterior import FALSE_ALARM, UNEXPLAINED
+from ringsim.campaign.calibration import MEMBERS
+from ringsim.sampling.distributions import Lognormal, Normal, Uniform
+
+STAND = Path(__file__).parents[1] / "campaigns" / "stand"
+RING = {
+    "structure.sections": 6, "boom": "none", "solver.end_time": 12.0, "record.interval": 0.1,
+}  # fmt: skip
+PRIORS: dict[str, dict[str, Any]] = {
+    "cables.upper.friction.coefficient":
+        {"kind": "lognormal", "mean": 5e-4, "standard_deviation": 2e-4},
+    "cables.lower.friction.coefficient":
+        {"kind": "lognormal", "mean": 5e-4, "standard_deviation": 2e-4},
+    "joints.vjoint.viscous": {"kind": "lognormal", "mean": 0.5, "standard_deviation": 0.15},
+    "cables.lower.winch.start_time": {"kind": "uniform", "low": 0.0, "high": 0.5},
+    "cables.upper.winch.winding.speed":
+        {"kind": "normal", "mean": 0.12, "standard_deviation": 2e-3},
+    "structure.opening_angle": {"kind": "normal", "mean": 20.0, "standard_deviation": 0.5},
+    "structure.corner_mass": {"kind": "lognormal", "mean": 0.02, "standard_deviation": 0.006},
+    "net.stiffness": {"kind": "lognormal", "mean": 1e-3, "standard_deviation": 4e-4},
+}  # fmt: skip
+"""Unknowns of the coverage; the wrong model has the first four."""
+PULLEYS = {
+    f"cables.{cable}.friction.coefficient": {
+        "kind": "lognormal", "mean": 4e-4, "standard_deviation": 8e-5, "each_section": True,
+    } for cable in ("upper", "lower")
+}  # fmt: skip
+BAD = 5.0
+"""The bad pulley's friction over the mean."""
+RUNS = {"coverage": 256, "wrong": 256, "bad": 320, "sound": 320, "flight": 128}
+KINDS = {"lognormal": Lognormal, "normal": Normal, "uniform": Uniform}
+PLANES, TIMES = ("upper", "lower"), np.arange(0.5, 11.6, 0.5)
+
+
+def law(table: dict[str, Any]) -> Any:
+    """The distribution of a table."""
+    return KINDS[table["kind"]](**{k: v for k, v in table.items() if k != "kind"})
+
+
+def readings_of(scene: ringsim.Scene, stream: np.random.Generator, folder: Path) -> None:
+    """Write the readings of a test, stand.toml and stand.csv."""
+    run = ringsim.simulate(scene, fidelity="frame")
+    if run["status"]:
+        raise ValueError(f"the truth fails: {run.attrs['reason']}")
+    angle = run["opening_angle"]
+    # The run ends once all joints are locked, where they stay.
+    after = angle.max("time")
+    sections = range(1, 7)
+    names = [f"{plane}{section}" for plane in PLANES for section in sections]
+    columns = []
+    for name in names:
+        place = {"plane": name[:5], "section": int(name[5:])}
+        own = angle.sel(place).dropna("time")
+        exact = np.interp(TIMES, own["time"], own, right=float(after.sel(place)))
+        columns.append(exact + 0.1 * stream.standard_normal(len(TIMES)))
+    np.savetxt(folder / "stand.csv", np.column_stack([TIMES, *columns]), delimiter=",",
+               header=",".join(["t", *names]), comments="", fmt="%.4f")  # fmt: skip
+    lines = ['name = "stand"', 'file = "stand.csv"', "[clock]", 'column = "t"']
+    for name in names:
+        lines += ["[[sensors]]", f'column = "{name}"', 'variable = "opening_angle"',
+                  f'place = {{ plane = "{name[:5]}", section = {name[5:]} }}', 'unit = "deg"',
+                  "standard_deviation = 0.1"]  # fmt: skip
+    (folder / "stand.toml").write_text("\n".join(lines))
+
+
+def one(kind: str, number: int, runs: int) -> dict[str, Any]:
+    """What one test gives."""
+    if kind == "flight":
+        return flight(number, runs)
+    stream = np.random.default_rng([number, 1])
+    base = ringsim.load_scene("ring18-cable").with_values(RING)
+    pulleys = kind in ("bad", "sound")
+    if pulleys:
+        priors = PULLEYS
+    elif kind == "wrong":
+        priors = dict(list(PRIORS.items())[:4])
+    else:
+        chosen = sorted(stream.choice(len(PRIORS), size=stream.integers(3, 9), replace=False))
+        priors = {name: PRIORS[name] for name in np.array(list(PRIORS))[chosen].tolist()}
+    found: dict[str, Any] = {"number": number}
+    values: dict[str, Any] = {}
+    for name, table in priors.items():
+        count = base.spans - 1 if table.get("each_section") else 1
+        drawn = law({k: v for k, v in table.items() if k != "each_section"}).quantile(
+            stream.random(count)
+        )
+        values[name] = drawn.tolist() if table.get("each_section") else float(drawn[0])
+    if kind == "bad":
+        name = list(priors)[stream.integers(2)]
+        place = int(stream.integers(len(values[name])))
+        values[name][place] = BAD * priors[name]["mean"]
+        found["place"] = [name, place]
+    truth = base.with_values(values)
+    if kind == "wrong":
+        truth = truth.with_values({"joints.vjoint.coulomb": float(stream.uniform(0.01, 0.03))})
+    with tempfile.TemporaryDirectory() as place_:
+        folder = Path(place_)
+        readings_of(truth, stream, folder)
+        calibration = ringsim.Calibration(
+            base, priors, folder / "stand.toml", runs=runs, seed=number, fidelity="frame"
+        )
+        with contextlib.redirect_stderr(io.StringIO()):
+            posterior = calibration.run(workers=0, out=folder / "out")
+    chances = np.append(posterior["chance"], posterior["chance_of_all"])
+    found["unexplained"] = bool((chances < UNEXPLAINED).any())
+    found["pattern"] = float(posterior["pattern"])
+    found["lost"] = int(posterior["lost"].sum())
+    found["strays"] = int(posterior["strays"].sum())
+    if pulleys:
+        return found | _standing(posterior, found.get("place"))
+    found["learnt"] = posterior["learnt"].values.tolist()
+    ranks = []
+    for name, value in values.items():
+        drawn = posterior[next(v for v in posterior if posterior[v].attrs.get("path") == name)]
+        ranks.append(int((drawn.values < value).sum()))
+    return found | {"unknowns": list(values), "ranks": ranks}
+
+
+def flight(number: int, runs: int) -> dict[str, Any]:
+    """What a test on the ground tells of the asynchrony in flight."""
+    stream = np.random.default_rng([number, 2])
+    stand = tomllib.loads((STAND / "friction.toml").read_text(encoding="utf-8"))
+    aloft = tomllib.loads((STAND / "flight_before.toml").read_text(encoding="utf-8"))
+    priors = stand["inputs"]
+    values = {name: float(law(t).quantile(stream.random(1))[0]) for name, t in priors.items()}
+    ground = ringsim.load_scene(stand["scene"]).with_values(stand["set"])
+    scene = ringsim.load_scene(aloft["scene"]).with_values(aloft["set"])
+    shared = {name: value for name, value in values.items() if name in aloft["inputs"]}
+    truth = float(ringsim.simulate(scene.with_values(shared), fidelity="frame")["asynchrony_max"])
+    found: dict[str, Any] = {"number": number, "truth": truth}
+    with tempfile.TemporaryDirectory() as place, contextlib.redirect_stderr(io.StringIO()):
+        folder = Path(place)
+        readings_of(ground.with_values(values | {"record.interval": 0.02}), stream, folder)
+        ringsim.Calibration(
+            ground, priors, folder / "stand.toml", runs=runs, seed=number, fidelity="frame"
+        ).run(workers=0, out=folder / "cal")
+        alone = [name for name in priors if name not in shared]
+        inputs = {
+            "before": aloft["inputs"],
+            "after": {"from": {"file": str(folder / "cal" / "posterior.nc"), "without": alone}},
+        }
+        for when, given in inputs.items():
+            runs_ = ringsim.Campaign(
+                scene, given, {"kind": "random", "samples": 64}, number, fidelity="frame"
+            ).run(workers=0, out=folder / when)
+            ends = np.quantile(runs_["asynchrony_max"].dropna("sample"), [0.05, 0.95])
+            found[when] = ends.tolist()
+    return found
+
+
+def _standing(posterior: xr.Dataset, place: list[Any] | None) -> dict[str, Any]:
+    chance = posterior["contrast_chance"].values
+    found: dict[str, Any] = {"alarms": int((chance < FALSE_ALARM).sum()),
+                             "least_chance": float(chance.min())}  # fmt: skip
+    if place is not None:
+        own = np.flatnonzero(posterior["input"].values == place[0])[place[1]]
+        found |= {"sigma": float(posterior["contrast"].values[own]),
+                  "stands_out": bool(chance[own] < FALSE_ALARM),
+                  "first": bool(np.abs(posterior["contrast"].values).argmax() == own)}  # fmt: skip
+    return found
+
+
+def told(kind: str, tests: list[dict[str, Any]]) -> str:
+    """What all tests say."""
+    count = len(tests)
+    if kind == "sound":
+        return f"{sum(t['alarms'] > 0 for t in tests)} of {count} tests have a false alarm"
+    if kind == "bad":
+        return (
+            f"{sum(t['stands_out'] for t in tests)} of {count} bad pulleys stand out, "
+            f"{sum(t['first'] for t in tests)} of them first; others with them in "
+            f"{sum(t['alarms'] > t['stands_out'] for t in tests)}"
+        )
+    if kind == "flight":
+        cut = [np.ptp(t["after"]) / np.ptp(t["before"]) for t in tests]
+        held = {
+            w: sum(t[w][0] <= t["truth"] <= t[w][1] for t in tests) for w in ("before", "after")
+        }
+        return (
+            f"intervals after the test are {np.median(cut):.3f} times those before (at most "
+            f"{max(cut):.3f}); they hold the truth in {held['after']} of {count}, those before in "
+            f"{held['before']}"
+        )
+    if kind == "wrong":
+        return f"{sum(t['unexplained'] for t in tests)} of {count} wrong models are told"
+    ranks = (np.concatenate([t["ranks"] for t in tests]) + 0.5) / (MEMBERS + 1)
+    shares = [float(np.mean(np.abs(ranks - 0.5) < 0.5 * level)) for level in (0.9, 0.95)]
+    classes = np.bincount((10 * ranks).astype(int), minlength=10)
+    even = scipy.stats.chisquare(classes).pvalue
+    return (
+        f"{count} tests, {len(ranks)} unknowns: intervals of 90 and 95 % hold in {shares[0]:.3f} "
+        f"and {shares[1]:.3f}; ranks {classes.tolist()}, even with p = {even:.2g}; "
+        f"{sum(t['unexplained'] for t in tests)} told not to be explained, "
+        f"{sum(t['lost'] for t in tests)} runs lost, {sum(t['strays'] for t in tests)} readings "
+        "set aside"
+    )
+
+
+def main() -> None:
+    """Run what is missing, and print."""
+    asked = argparse.ArgumentParser()
+    asked.add_argument("--kind", choices=(*RUNS,), default="coverage")
+    asked.add_argument("--first", type=int, default=0)
+    asked.add_argument("--tests", type=int, default=20)
+    asked.add_argument("--runs", type=int)
+    asked.add_argument("--file", type=Path)
+    wanted = asked.parse_args()
+    file = wanted.file or Path("runs") / f"calibration-{wanted.kind}.json"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    tests = json.loads(file.read_text()) if file.exists() else []
+    for number in range(wanted.first, wanted.first + wanted.tests):
+        if any(test["number"] == number for test in tests):
+            continue
+        tests.append(one(wanted.kind, number, wanted.runs or RUNS[wanted.kind]))
+        file.write_text(json.dumps(tests))
+        print(tests[-1], flush=True)
+    print(told(wanted.kind, tests))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,412 @@
+"""What measured data tell of unknown inputs: posterior distributions from runs of an ensemble.
+
+Inputs are points u of standard normal space, x = F^-1(Phi(u)) with the prior's F, so that the prior
+is N(0, 1) along each axis.  Each stage has an ensemble of points and its runs.  Outputs y, over the
+scatter of the readings, are a linear map of the points about that ensemble, and what is left:
+
+    y = b + J u + e,    Cov(e) = S
+
+S, by how far the runs lie off the map, counts as an error of the map beside the scatter I of the
+readings d, so that
+
+    C = (I + J' (I + S)^-1 J)^-1,    m = C J' (I + S)^-1 (d - b)
+
+are wide as long as the ensemble is too wide for a linear map, and the posterior once it is narrow.
+The next ensemble is drawn from N(m, WIDER^2 C): no factors to choose, and nothing to tune.
+Source: Cleary, Garbuno-Inigo, Lan, Schneider and Stuart, J. Comput. Phys. 424 (2021) 109716,
+"Calibrate, emulate, sample", here with a linear emulator; for a linear model it is the closed form.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import scipy.special
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsim.stepping.instant import Array
+from ringsim.tables import (
+    Table,
+    chance_text,
+    counted,
+    interval_text,
+    number_text,
+    readable,
+    unit_text,
+)
+
+Mask = NDArray[np.bool_]
+
+WIDER = 1.3
+"""Scale of an ensemble over the posterior that it is drawn from, so that the map is known at its
+edge, too, where a stage was a little wrong."""
+MEMBERS_AN_UNKNOWN = 2
+"""Runs at least of a stage for each coefficient of the map: as many again tell how far off it is.
+"""
+UNEXPLAINED = 1e-3
+"""Chance of a misfit below which the model, and not the scatter, is to blame."""
+FALSE_ALARM = 0.01
+"""Probability at most with which any place of an input is told to stand out although all are as the
+prior says."""
+_STRAY = 0.01
+"""Probability with which a test without faults has a stray reading."""
+_FEW = 0.1
+"""Share of a sensor's readings from which on it is not strays that are wrong."""
+_LEAST_KNOWN = 1e-12
+"""Variance of a contrast of which the data say nothing, in place of round-off."""
+_HARDLY = 0.9
+"""Posterior over prior scatter from which on an unknown has hardly been learnt: a fifth of the
+variance at most is gone."""
+_TOGETHER = 0.8
+"""Correlation of two unknowns from which on the data tell a combination of them and hardly more."""
+_LISTED = 6
+"""Unknowns up to which each has a column in a table of sensors."""
+_SEEN = 0.1
+"""Scatter of an ensemble along a direction of the outputs, over that of the readings, below which
+the direction tells nothing: a hundredth of what one reading does."""
+
+
+class Posterior(NamedTuple):
+    """A posterior distribution in standard normal space, and the readings that it explains."""
+
+    mean: Array
+    """Shape (unknowns,)."""
+    covariance: Array
+    """Shape (unknowns, unknowns)."""
+    expected: Array
+    """What the sensors would read at the mean, over their scatter, shape (readings,)."""
+    off: Array
+    """Scatter of runs off the map, the same way, shape (readings,)."""
+
+    def draw(self, count: int, stream: np.random.Generator, scale: float = 1.0) -> Array:
+        """Points of it, wider by ``scale``, shape (count, unknowns)."""
+        free = stream.standard_normal((count, len(self.mean)))
+        return np.asarray(self.mean + scale * free @ np.linalg.cholesky(self.covariance).T)
+
+
+def posterior_of(points: Array, outputs: Array, data: Array) -> Posterior:
+    """The posterior by the linear map of an ensemble.
+
+    Parameters
+    ----------
+    points
+        Of the runs in standard normal space, shape (runs, unknowns); at least
+        ``MEMBERS_AN_UNKNOWN`` runs for each unknown and one more.
+    outputs
+        What the sensors would read in each run, over the scatter of a reading, shape
+        (runs, readings).
+    data
+        What they have read, the same way, shape (readings,).
+
+    Examples
+    --------
+    >>> stream = np.random.default_rng(1)
+    >>> points = stream.standard_normal((50, 1))
+    >>> found = posterior_of(points, 3.0 * points, np.array([3.0]))
+    >>> found.mean.round(6), found.covariance.round(6)  # 9 / (1 + 9), 1 / (1 + 9)
+    (array([0.9]), array([[0.1]]))
+    """
+    runs, unknowns = points.shape
+    middle = outputs.mean(axis=0)
+    _, sizes, across = np.linalg.svd(outputs - middle, full_matrices=False)
+    told = int((sizes > _SEEN * np.sqrt(runs - 1.0)).sum())
+    # Of more directions than that the residual covariance would be known too badly.
+    across = across[: max(1, min(told, runs // 4))]
+    reduced, wanted = (outputs - middle) @ across.T, (data - middle) @ across.T
+    known = np.column_stack([np.ones(runs), points])
+    (start, *slopes), *_ = np.linalg.lstsq(known, reduced, rcond=None)
+    slopes = np.array(slopes)  # (unknowns, directions)
+    freedom = runs - unknowns - 1
+    left = reduced - known @ np.vstack([start, slopes])
+    error = np.eye(len(across)) + left.T @ left / freedom
+    weighed = np.linalg.solve(error, slopes.T)
+    covariance = np.linalg.inv(np.eye(unknowns) + slopes @ weighed)
+    mean = covariance @ (weighed.T @ (wanted - start))
+    whole, *_ = np.linalg.lstsq(known, outputs, rcond=None)
+    off = np.sqrt(((outputs - known @ whole) ** 2).sum(axis=0) / freedom)
+    expected = np.concatenate([[1.0], mean]) @ whole
+    return Posterior(mean, 0.5 * (covariance + covariance.T), expected, off)
+
+
+class Told(NamedTuple):
+    """What one sensor has read, and would have read in each run."""
+
+    sensor: str
+    computed: Array
+    """Shape (runs, readings)."""
+    measured: Array
+    """Shape (readings,)."""
+    deviation: float
+    """Standard deviation of one reading."""
+    bias: float = 0.0
+    """That of what all readings of the sensor have in common."""
+
+    def only(self, kept: Mask) -> "Told":
+        """The readings that are kept, shape (readings,) of true and false."""
+        return self._replace(computed=self.computed[:, kept], measured=self.measured[kept])
+
+    def scaled(self, values: Array) -> Array:
+        """Values of the readings, shape (..., readings), over their scatter.
+
+        With a common bias their covariance is s^2 (1 + r 11'), r = (bias / s)^2; its inverse root
+        is (1 - (1 - 1 / sqrt(1 + n r)) 11' / n) / s.
+        """
+        count = values.shape[-1]
+        share = 1.0 - 1.0 / np.sqrt(1.0 + count * (self.bias / self.deviation) ** 2)
+        return np.asarray(
+            (values - share * values.mean(axis=-1, keepdims=True) if count else values)
+            / self.deviation
+        )
+
+
+class Fit(NamedTuple):
+    """How well the posterior's mean explains the readings of one sensor."""
+
+    sensor: str
+    readings: int
+    """That were used."""
+    strays: int
+    """That were set aside: alone among readings that fit, and too far off for chance."""
+    rms: float
+    """Of readings less what is expected, over the scatter of a reading."""
+    chance: float
+    """Probability of so large an rms by the scatter alone; at most 1 for all sensors together."""
+
+
+class Learnt(NamedTuple):
+    """What an ensemble and the data tell together."""
+
+    posterior: Posterior
+    fits: list[Fit]
+    pattern: float
+    """How alike successive misfits of a sensor are, N(0, 1) if nothing but scatter makes them: sum
+    of products of neighbours over the root of their number."""
+    chance: float
+    """Probability of so large an rms of all readings, or of such a pattern, by scatter alone: a
+    model that is wrong by less than the scatter of a reading shows in its many readings."""
+
+
+def learn(points: Array, told: Sequence[Told]) -> Learnt:
+    """The posterior by all sensors, without stray readings; ``points`` as in ``posterior_of``.
+
+    A reading is a stray if it is further off than one in ``1 / _STRAY`` tests has any by chance,
+    farthest first; a sensor that had too many of them is not explained, and keeps them all.
+    """
+    kept = [np.ones(len(each.measured), dtype=bool) for each in told]
+    whole = set[int]()
+    while True:
+        own = [each.only(mask) for each, mask in zip(told, kept, strict=True)]
+        found = posterior_of(
+            points, np.concatenate([each.scaled(each.computed) for each in own], axis=1),
+            np.concatenate([each.scaled(each.measured) for each in own]),
+        )  # fmt: skip
+        ends = np.cumsum([len(each.measured) for each in own])[:-1]
+        apart = np.split(np.concatenate([e.scaled(e.measured) for e in own]) - found.expected, ends)
+        sizes = [np.abs(a) / np.sqrt(1.0 + o**2)
+                 for a, o in zip(apart, np.split(found.off, ends), strict=True)]  # fmt: skip
+        open_ = [k for k, size in enumerate(sizes) if k not in whole and len(size)]
+        limit = -scipy.special.ndtri(0.5 * _STRAY / len(found.expected))
+        # Others may only look stray beside a farther one.
+        limit = max(limit, 0.5 * max((float(sizes[k].max()) for k in open_), default=0.0))
+        worst = [k for k in open_ if (sizes[k] > limit).any()]
+        if not worst:
+            break
+        for k in worst:
+            kept[k][np.flatnonzero(kept[k])[sizes[k] > limit]] = False
+            if (~kept[k]).sum() > _FEW * len(kept[k]):
+                kept[k][:] = True
+                whole.add(k)
+    rows, every = [], np.concatenate(apart)
+    products = np.concatenate([misfit[1:] * misfit[:-1] for misfit in apart])
+    pattern = float(products.sum() / np.sqrt(max(1, len(products))))
+    largest = float(scipy.special.chdtrc(len(every), float(every @ every)))
+    overall = min(1.0, 2.0 * min(largest, float(scipy.special.ndtr(-pattern))))
+    for each, mask, misfit in zip(told, kept, apart, strict=True):
+        beyond = float(scipy.special.chdtrc(len(misfit), float(misfit @ misfit)))
+        rms = float(np.sqrt(np.mean(misfit**2))) if len(misfit) else np.nan
+        chance = min(1.0, len(told) * beyond) if len(misfit) else 1.0
+        rows.append(Fit(each.sensor, len(misfit), int((~mask).sum()), rms, chance))
+    return Learnt(found, rows, pattern, overall)
+
+
+def contrasts(found: Posterior, places: Sequence[int]) -> tuple[Array, Array]:
+    """How far each of some unknowns stands out from the mean of the others, in sigma, and how
+    probable so much in any of them is if all are as the priors say; ``places`` are their numbers.
+
+    Before the data the posterior mean m is N(0, 1 - C), so that a'm of a contrast a has the
+    variance a'(1 - C)a.  What all have in common (a warmer test) cancels.  Probabilities are
+    Bonferroni's.
+    """
+    count, chosen = len(places), np.array(places)
+    known = np.eye(len(found.mean)) - found.covariance
+    mean, known = found.mean[chosen], known[np.ix_(chosen, chosen)]
+    each = (count * np.eye(count) - 1.0) / (count - 1.0)
+    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", each, known, each), _LEAST_KNOWN))
+    out = each @ mean / spread
+    return out, np.minimum(1.0, 2.0 * count * scipy.special.ndtr(-np.abs(out)))
+
+
+class Ranking(NamedTuple):
+    """How much sensors would tell."""
+
+    order: list[int]
+    """Of the sensors: each next one is that which adds most to those before."""
+    after: Array
+    """Posterior over prior scatter of each unknown with the first k + 1 of them, shape (sensors,
+    unknowns)."""
+    alone: Array
+    """The same with each sensor alone, in their own order."""
+
+
+def rank(points: Array, told: Sequence[Told]) -> Ranking:
+    """Sensors in the order in which they leave least of the scatter of unknowns (geometric mean).
+
+    What has been read does not matter: of a linear map the covariance is the same for any data.
+    """
+    reduced = []
+    for each in told:
+        values = each.scaled(each.computed)
+        # Turned into at most as many directions as runs: what it tells is unchanged.
+        sides, sizes, _ = np.linalg.svd(values - values.mean(axis=0), full_matrices=False)
+        reduced.append(sides * sizes)
+
+    def scatter(chosen: Sequence[int]) -> Array:
+        outputs = np.concatenate([reduced[k] for k in chosen], axis=1)
+        covariance = posterior_of(points, outputs, np.zeros(outputs.shape[1])).covariance
+        return np.asarray(np.sqrt(np.diag(covariance)))
+
+    every, order, after = range(len(told)), list[int](), list[Array]()
+    alone = np.array([scatter([k]) for k in every])
+    while len(order) < len(told):
+        left = [k for k in every if k not in order]
+        best = min(left, key=lambda k: float(np.log(scatter([*order, k])).sum()))
+        order.append(best)
+        after.append(scatter(order))
+    return Ranking(order, np.array(after), alone)
+
+
+# What a posterior says, as tables.
+
+
+def calibration_tables(found: xr.Dataset) -> list[Table]:
+    """What a calibration found (the dataset of its posterior): unknowns, then sensors."""
+    rows = []
+    for name in found["unknown"].values:
+        one = found.sel(unknown=name)
+        units = str(one["unknown_units"].item())
+        prior, posterior = one["prior_quantile"].values, one["posterior_quantile"].values
+        factor, unit = readable(units, float(np.abs(prior).max()))
+        rows.append((
+            str(name), unit_text(unit), interval_text(*(factor * prior[[0, -1]])),
+            number_text(factor * posterior[1]), interval_text(*(factor * posterior[[0, -1]])),
+            number_text(float(one["learnt"]), 2),
+        ))  # fmt: skip
+    notes = [
+        "90 % intervals; remaining scatter: that of the posterior over that of the prior, 1 where "
+        "the data say nothing",
+        *_hardly(found),
+        *_together(found),
+        *_standing_out(found),
+    ]
+    head = ("unknown", "unit", "prior", "median", "posterior", "remaining scatter")
+    first = Table(head, rows, notes)
+    sensors = [
+        (str(one["sensor"].item()), str(int(one["readings"])),
+         str(int(one["strays"])) if one["strays"] else "-",
+         number_text(float(one["rms_in_deviations"]), 3), chance_text(float(one["chance"])))
+        for k in np.argsort(-found["rms_in_deviations"].values, kind="stable")
+        for one in [found.isel(sensor=int(k))]
+    ]  # fmt: skip
+    heads = ("sensor", "readings", "set aside", "rms / sigma", "by scatter alone")
+    return [first, Table(heads, sensors, _verdict(found))]
+
+
+def _hardly(found: xr.Dataset) -> list[str]:
+    names = found["unknown"].values[found["learnt"].values > _HARDLY]
+    return [f"hardly learnt from these sensors: {', '.join(names)}"] if len(names) else []
+
+
+def _together(found: xr.Dataset) -> list[str]:
+    names, matrix = found["unknown"].values, found["correlation"].values
+    lines = []
+    for one, other in zip(*np.triu_indices(len(names), 1), strict=True):
+        if abs(r := matrix[one, other]) > _TOGETHER:
+            how = "difference" if r > 0.0 else "sum"
+            lines.append(
+                f"{names[one]} and {names[other]}: the data tell their {how}, and each alone less "
+                f"well (correlation {r:+.2f})"
+            )
+    return lines
+
+
+def _standing_out(found: xr.Dataset) -> list[str]:
+    """Places of an input that are unlike its others, most probable ones first."""
+    lines = []
+    for name in dict.fromkeys(str(n) for n in found["input"].values):
+        own = found.isel(unknown=np.flatnonzero(found["input"].values == name))
+        if not np.isfinite(own["contrast"]).any():
+            continue
+        order = np.argsort(-np.abs(own["contrast"].values), kind="stable")
+        far = [k for k in order if own["contrast_chance"].values[k] < FALSE_ALARM]
+        told = ", ".join(
+            f"{str(own['unknown'].values[k]).removeprefix(name)} ({own['contrast'].values[k]:+.1f} "
+            "sigma)" for k in far
+        )  # fmt: skip
+        lines.append(
+            f"{name}: " + (f"stands out from the other places: {told}" if far else
+                           f"no place stands out; the farthest is "
+                           f"{str(own['unknown'].values[order[0]]).removeprefix(name)} "
+                           f"({own['contrast'].values[order[0]]:+.1f} sigma)")
+            + f" (false alarms: at most {FALSE_ALARM:g} if all are as the prior says)"
+        )  # fmt: skip
+    return lines
+
+
+def sensors_table(found: xr.Dataset) -> Table:
+    """Sensors in the order in which they tell most (the dataset of ``ringsim sensors``)."""
+    names = [str(name) for name in found["unknown"].values]
+    listed = names if len(names) <= _LISTED else []
+    after, alone = (np.exp(np.log(found[k].values).mean(axis=1)) for k in ("learnt", "alone"))
+    rows = [
+        (str(k + 1), str(sensor), number_text(alone[k], 2), number_text(after[k], 2),
+         *(number_text(float(found["learnt"].values[k, names.index(name)]), 2) for name in listed))
+        for k, sensor in enumerate(found["sensor"].values)
+    ]  # fmt: skip
+    notes = [
+        "remaining scatter over that of the prior: of all unknowns (geometric mean) with the "
+        "sensor alone, and with all above it; of each unknown with all above it",
+        "each next sensor is the one that leaves least; about the medians of the priors",
+        *(f"hardly learnt even from all of them: {name}"
+          for name, v in zip(names, found["learnt"].values[-1], strict=True) if v > _HARDLY),
+    ]  # fmt: skip
+    return Table(("", "sensor", "alone", "together", *listed), rows, notes)
+
+
+def _verdict(found: xr.Dataset) -> list[str]:
+    """Whether the model explains the data, and what was left out."""
+    beyond, notes = found["chance"].values < UNEXPLAINED, list[str]()
+    if beyond.any() or float(found["chance_of_all"]) < UNEXPLAINED:
+        names = ", ".join(found["sensor"].values[beyond])
+        alike = f"{float(found['pattern']):+.1f} sigma"
+        how = f"{names} differ by more than scatter" if names else (
+            f"all sensors together differ too much, or too evenly (successive misfits: {alike}),"
+        )  # fmt: skip
+        notes.append(
+            f"NOT EXPLAINED: {how} from what any values of these unknowns give: the model lacks "
+            "something, numerical errors (solver.tolerance) count, or sigma is too small; the "
+            "intervals above are too narrow then"
+        )
+    else:
+        notes.append("the posterior explains every sensor within the scatter of its readings")
+    if strays := int(found["strays"].sum()):
+        notes.append(
+            f"set aside: {counted(strays, 'reading')} too far off for chance, alone among readings "
+            "of their sensor that fit"
+        )
+    lost, unused = int(found["lost"].sum()), int(found["unused"])
+    if lost:
+        notes.append(f"{counted(lost, 'run')} of {found.attrs['runs']} failed and told nothing")
+    if unused:
+        notes.append(f"{counted(unused, 'reading')} left out, for which some run has no value")
+    return notes

@@ -1,0 +1,555 @@
+"""Unknown inputs from the measured data of a test: stages of campaigns, and what they tell."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import netCDF4
+import numpy as np
+import scipy
+import tomli_w
+import xarray as xr
+from pydantic import Field, ValidationError
+
+from ringsim import build
+from ringsim.analysis.posterior import (
+    MEMBERS_AN_UNKNOWN,
+    WIDER,
+    Learnt,
+    Told,
+    contrasts,
+    learn,
+    rank,
+)
+from ringsim.analysis.residuals import predictions
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.python import campaign_text, open_campaign
+from ringsim.campaign.run import Ended, Order, listed_cases, require_no_launcher, start
+from ringsim.campaign.specification import Campaign, campaign_of
+from ringsim.files import parse_toml, read_text, whole, writing
+from ringsim.measured import Measurement, load_measured
+from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
+from ringsim.sampling.columns import Table, add_inputs, correlate, pairs_of
+from ringsim.sampling.designs.independent import sobol_points
+from ringsim.sampling.distributions import Array, Calibrated, Distribution, Ranged, inside
+from ringsim.sampling.table import AnyDistribution
+from ringsim.scene import Scene
+from ringsim.units import Model
+from ringsim.variables import Status
+
+POSTERIOR = "posterior.nc"
+"""The result of a calibration, in its folder."""
+SENSORS = "sensors.nc"
+"""What each sensor would tell, in the folder of ``ringsim sensors``."""
+MEMBERS = 1000
+"""Samples of a posterior in its file: their 5 % quantile is off by a hundredth in probability."""
+_FINE = 25.0
+"""Records of a run between two readings.  Between records curves are taken as straight, which of a
+rope's first load made 0.1 N of 48 N with five records, and makes a twenty-fifth of it so."""
+_MOST_RECORDS = 2000
+"""Records of a run at most, which keeps a stage of 64 runs below half a gigabyte."""
+_LEVELS = (0.05, 0.5, 0.95)
+_NAME = "ringsim.Calibration"
+"""How refusals of arguments begin, as those of files with the file's name."""
+
+
+class ClockPrior(Model):
+    """What is not known of the measured clock, in place of the measured file's values."""
+
+    offset: AnyDistribution | None = None
+    """Of clock.offset, s."""
+    drift: AnyDistribution | None = None
+    """Of clock.drift."""
+
+
+class Budget(Model):
+    """What a calibration file has beyond the keys of a campaign file."""
+
+    measured: str
+    """File of measured data, beside this file."""
+    runs: Annotated[int, Field(ge=16, le=1_000_000)] = 256
+    """Of all stages together."""
+    stages: Annotated[int, Field(ge=1, le=20)] = 4
+    """How often the ensemble is drawn anew, the first time from the priors."""
+    clock: ClockPrior = ClockPrior()
+    """Unknowns of the measured clock."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """A calibration file: its campaign of the priors, the measured data, and the budget."""
+
+    campaign: Campaign
+    measurement: Measurement
+    budget: Budget
+
+    @property
+    def members(self) -> int:
+        """Runs of each stage."""
+        return self.budget.runs // self.budget.stages
+
+
+def calibration_of(
+    text: str, path: Path, settings: Mapping[str, Any] | None = None, scene: Scene | None = None
+) -> Given:
+    """The calibration that a text describes: a campaign file without a design, with ``measured``
+    and a budget.  ``path``, ``settings`` and ``scene`` are as in ``campaign_of``.
+
+    InputError if it, the data or a prior is refused.
+    """
+    table = parse_toml(text, path.name)
+    own = {name: table.pop(name) for name in Budget.model_fields if name in table}
+    try:
+        budget = Budget.model_validate(own)
+    except ValidationError as error:
+        raise InputError(explain(error, Budget, path.name)) from None
+    for key, cure in {
+        "design": "a calibration places its own samples: leave it out, and set runs and stages",
+        "check_every": "leave it out, and run samples of the result by the full engine",
+        "stop_when": "a calibration runs all its stages: leave it out",
+        "requirements": "give them to a campaign that draws from the result: leave it out",
+    }.items():
+        if key in table:
+            raise InputError(f"{path.name}: {key}: {cure}")
+    table.setdefault("fidelity", "frame")
+    table["design"] = {"kind": "random", "samples": max(1, budget.runs // budget.stages)}
+    campaign = campaign_of(tomli_w.dumps(table), path, settings, scene=scene)
+    if not campaign.specification.inputs:
+        raise InputError(f"{path.name}: inputs: there is nothing to find: give priors of unknowns")
+    measurement = load_measured(path.parent / budget.measured, planned=True)
+    found = Given(campaign, measurement, budget)
+    unknowns = len(Unknowns.of(found).names)
+    if found.members < (least := MEMBERS_AN_UNKNOWN * (unknowns + 1)):
+        raise InputError(
+            f"{path.name}: runs = {budget.runs}: {found.members} in each of {budget.stages} stages "
+            f"are too few for {unknowns} unknowns: set runs = {least * budget.stages} at least"
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One unknown number: an axis of standard normal space."""
+
+    name: str
+    """Path or name in a campaign file, with the place where there is one for each."""
+    law: Distribution
+    """Its prior."""
+    units: str
+    input: str
+    """The key that it is drawn for."""
+    shared: tuple[str, ...] = ()
+    """Scene paths that all take it, if not the name alone."""
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """The unknowns of a calibration: those of the scene, then those of the measured clock."""
+
+    template: Table
+    axes: tuple[Axis, ...]
+    lower: Array
+    """Root L of the priors' correlations R = L L', shape (unknowns, unknowns): a point w of
+    standard normal space is at u = L w, each u_k N(0, 1)."""
+
+    @classmethod
+    def of(cls, given: Given) -> "Unknowns":
+        """Those that a calibration asks for; InputError if one is no number of a range."""
+        asked, file = given.campaign.specification, given.campaign.file.name
+        table, axes = given.campaign.draw(), dict[str, Axis]()
+        for column in table.columns:
+            law = asked.inputs[column.input]
+            if not isinstance(law, Ranged | Calibrated):
+                raise InputError(
+                    f"{file}: inputs.{column.input}: only numbers that may lie anywhere in a range "
+                    "can be found from data: give it a continuous distribution"
+                )
+            bare = law.model_copy(update={"shared": (), "each_section": False})
+            for mark in _marks(column.values, () if law.shared else column.places):
+                shared = tuple(f"{path}{mark}" for path in law.shared)
+                axes[f"{column.input}{mark}"] = Axis(
+                    f"{column.input}{mark}", bare, column.units, column.input, shared
+                )
+        for name, units in {"offset": "s", "drift": "1"}.items():
+            if (law := getattr(given.budget.clock, name)) is not None:
+                if given.measurement.file.clock is None:
+                    raise InputError(f"{file}: clock.{name}: the measured data have no clock")
+                axes[f"clock.{name}"] = Axis(f"clock.{name}", law, units, f"clock.{name}")
+        matrix = np.eye(len(axes))
+        for pair, one, other in pairs_of(list(axes), asked.correlations):
+            matrix[one, other] = matrix[other, one] = pair.coefficient
+        correlate(np.full((1, len(axes)), 0.5), list(axes), asked.correlations)  # refuses others
+        return cls(
+            table, tuple(axes.values()), np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+        )
+
+    @property
+    def names(self) -> list[str]:
+        """Of the axes."""
+        return [axis.name for axis in self.axes]
+
+    def values(self, points: Array) -> dict[str, Array]:
+        """Values by axis at points of standard normal space, shape (samples, unknowns)."""
+        shares = inside(scipy.special.ndtr(points @ self.lower.T))
+        return {a.name: a.law.quantile(shares[:, k]) for k, a in enumerate(self.axes)}
+
+    def at(self, points: Array) -> Table:
+        """The inputs of the scene there."""
+        known, columns = self.values(points), []
+        for column in self.template.columns:
+            own = [known[a.name] for a in self.axes if a.input == column.input]
+            values = np.stack(own, axis=1) if column.dim else own[0]
+            columns.append(replace(column, values=values))
+        return Table(tuple(columns), np.arange(len(points), dtype=np.int64))
+
+    def cases(self, points: Array) -> list[dict[str, float]]:
+        """Values by scene path of each point, one value to a path."""
+        found = []
+        for sample, table in ((k, self.at(points)) for k in range(len(points))):
+            row = dict[str, float]()
+            for column in table.columns:
+                each = np.atleast_1d(column.values[sample])
+                marks = _marks(column.values, ())
+                row |= {f"{column.path}{m}": float(v) for m, v in zip(marks, each, strict=True)}
+            found.append(row)
+        return found
+
+    def spread(self, learnt: Learnt) -> tuple[Array, Array]:
+        """Mean and covariance of u."""
+        found = learnt.posterior
+        return self.lower @ found.mean, self.lower @ found.covariance @ self.lower.T
+
+
+def _marks(values: Array, places: tuple[str, ...]) -> list[str]:
+    """What follows a path: nothing, or the number or name of each place."""
+    if values.ndim == 1:
+        return [""]
+    return [f'["{p}"]' for p in places] or [f"[{k + 1}]" for k in range(values.shape[1])]
+
+
+@dataclass
+class _Course:
+    """The stages of a calibration, or of a plan of sensors, one order after the other."""
+
+    given: Given
+    folder: Path
+    ended: Callable[["_Course"], None]
+    """What is done with all stages."""
+    planning: bool = False
+    """Whether what sensors read is what they would read at the medians of all unknowns."""
+    stages: list[Learnt] = field(default_factory=list)
+    told: list[Told] = field(default_factory=list)
+    """Of the last stage."""
+    points: list[Array] = field(default_factory=list)
+    """Of each stage that was ordered."""
+    lost: list[int] = field(default_factory=list)
+    """Runs of each stage that failed, and so tell nothing."""
+    unused: int = 0
+    """Readings that some run of the last stage has no value for."""
+    nominal: list[Array] = field(default_factory=list)
+
+    def order(self) -> Order:
+        """The next stage, from the results of those before."""
+        given, asked = self.given, self.given.campaign.specification
+        if given.measurement.file.planned and not self.planning:
+            raise InputError(
+                f"{given.campaign.file.name}: measured = {given.budget.measured}: this test is "
+                "still to come (ringsim sensors): give its table as file, and clock.column"
+            )
+        unknowns, number = Unknowns.of(given), len(self.points)
+        if number:
+            self._learn(unknowns)
+        stream = np.random.default_rng([asked.seed, number])
+        if number:
+            points = self.stages[-1].posterior.draw(given.members, stream, WIDER)
+        else:
+            even = sobol_points(given.members, len(unknowns.names), stream, kind="calibration")
+            points = scipy.special.ndtri(inside(even))
+            if self.planning:
+                points[0] = 0.0
+        self.points.append(points)
+        stages = given.budget.stages
+        name, title = f"stage-{number + 1}", f"stage {number + 1} of {stages}"
+        try:
+            campaign = listed_cases(
+                self.folder, name,
+                given.campaign.scene.with_values({"record.interval": _interval(given)}),
+                unknowns.cases(points), title=f"{asked.title or asked.name}: {title}",
+                timeout=asked.limits.timeout, fidelity=asked.fidelity,
+            )  # fmt: skip
+        except InputError as error:
+            raise InputError(
+                f"{given.campaign.file.name}: {title} is refused: {error} (where a value of the "
+                "scene is at fault: truncate the prior that gives it)"
+            ) from None
+        last = number + 1 == stages
+        return Order(campaign, self.folder / name, more=not last, brief=True)
+
+    def then(self, folder: Path) -> None:
+        """Learn from the last stage, unless runs are missing, and write what all have told."""
+        ordered = len(self.points) == self.given.budget.stages
+        if ordered and not len(open_folder(folder).survey().missing):
+            self._learn(Unknowns.of(self.given))
+            self.ended(self)
+
+    def _learn(self, unknowns: Unknowns) -> None:
+        points, name = self.points[-1], f"stage-{len(self.points)}"
+        with open_campaign(self.folder / name) as runs:
+            well = np.flatnonzero(runs["status"].to_numpy() == Status.OK)
+            least = MEMBERS_AN_UNKNOWN * (points.shape[1] + 1)
+            if len(well) < least:
+                raise InputError(
+                    f"{name}: {len(well)} of {len(points)} runs ended well, and "
+                    f"{points.shape[1]} unknowns take {least}: look at the others (ringsim status "
+                    f"{self.folder / name}), narrow the priors or raise runs"
+                )
+            known = unknowns.values(points)
+            clocks = [known.get(f"clock.{name}") for name in ("offset", "drift")]
+            offset, drift = (None if each is None else each[well] for each in clocks)
+            every = predictions(
+                runs.isel(sample=well), self.given.measurement, offset=offset, drift=drift
+            )
+        if self.planning and not self.nominal:
+            if well[0] != 0:
+                raise InputError(f"{name}: the run at the medians of all unknowns failed")
+            self.nominal = [values[0] for values in every]
+        self.told, self.unused = [], 0
+        for k, (readings, values) in enumerate(
+            zip(self.given.measurement.readings, every, strict=True)
+        ):
+            measured = self.nominal[k] if self.planning else readings.values
+            there = np.isfinite(values).all(axis=0) & np.isfinite(measured)
+            self.unused += int((~there).sum())
+            if there.any():
+                self.told.append(Told(readings.sensor.name, values[:, there], measured[there],
+                                      readings.deviation, readings.bias_deviation))  # fmt: skip
+        if not self.told:
+            raise InputError(
+                f"{name}: no reading lies within all runs: check clock.offset of the measured data "
+                "and solver.end_time of the scene"
+            )
+        self.stages.append(learn(points[well], self.told))
+        self.points[-1] = points[well]
+        self.lost.append(len(points) - len(well))
+
+
+def _interval(given: Given) -> float:
+    """Spacing of records (s), fine enough for the readings to lie between close ones."""
+    scene = given.campaign.scene
+    apart = [np.diff(each.times) for each in given.measurement.readings if len(each.times) > 1]
+    spacing = min((float(np.median(each)) for each in apart), default=np.inf)
+    wished = max(spacing / _FINE, scene.solver.end_time / _MOST_RECORDS)
+    return float(f"{min(scene.record.interval, wished):.3g}")
+
+
+def run_course(
+    given: Callable[[], Given], workers: int | None, out: Path | None, *, planning: bool = False
+) -> tuple[Ended, Path]:
+    """Run all stages that are missing, on all ranks of an MPI world or with so many workers, and
+    write what they tell into the folder ``out`` (runs/NAME): ``POSTERIOR``, or ``SENSORS`` if it is
+    for ``planning``.  How it ended, and the file.
+
+    Each stage is a campaign in that folder, which other verbs read; the same call goes on with one
+    that was interrupted, to the same result.
+    """
+    courses, name = list[_Course](), SENSORS if planning else POSTERIOR
+
+    def order() -> Order:
+        if not courses:
+            require_no_launcher(workers)
+            found = given()
+            called = found.campaign.specification.name + "-sensors" * planning
+            write = _write_sensors if planning else _write_posterior
+            courses.append(_Course(found, out or Path("runs") / called, write, planning))
+        return courses[0].order()
+
+    ended = start(workers, order, lambda folder: courses[0].then(folder))
+    return ended, (courses[0].folder if courses else out or Path()) / name
+
+
+def _write_posterior(course: _Course) -> None:
+    """The file of a posterior: samples of it, and what it says of unknowns and sensors."""
+    given, last = course.given, course.stages[-1]
+    asked, unknowns = given.campaign.specification, Unknowns.of(given)
+    names, sensors = unknowns.names, [fit.sensor for fit in last.fits]
+    mean, covariance = unknowns.spread(last)
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviation, deviation)
+    stream = np.random.default_rng([asked.seed, len(course.stages)])
+    table = unknowns.at(last.posterior.draw(MEMBERS, stream))
+    laws = [
+        _moved(axis, m, s, given.measurement.file.name)
+        for axis, m, s in zip(unknowns.axes, mean.tolist(), deviation.tolist(), strict=True)
+    ]
+    levels = np.array(_LEVELS)
+    contrast, chance = np.full((2, len(names)), np.nan)
+    for name in dict.fromkeys(axis.input for axis in unknowns.axes):
+        own = [k for k, axis in enumerate(unknowns.axes) if axis.input == name]
+        if len(own) > 2:  # of two nobody can say which one is unlike the other
+            contrast[own], chance[own] = contrasts(last.posterior, own)
+    per_unknown, per_sensor, per_stage = ("unknown",), ("sensor",), ("stage",)
+    numbers: dict[str, tuple[tuple[str, ...], Any, str]] = {
+        "prior_quantile": (("unknown", "level"),
+                           np.array([axis.law.quantile(levels) for axis in unknowns.axes]),
+                           "quantiles of the prior"),
+        "posterior_quantile": (("unknown", "level"), np.array([x.quantile(levels) for x in laws]),
+                               "quantiles of the posterior"),
+        "shift": (per_unknown, mean, "mean of the posterior in standard normal space: sigmas of "
+                  "the prior from its median"),
+        "learnt": (per_unknown, deviation, "standard deviation of the posterior over that of the "
+                   "prior, both in standard normal space"),
+        "correlation": (("unknown", "other"), correlation,
+                        "correlation of unknowns in the posterior, in standard normal space"),
+        "contrast": (per_unknown, contrast,
+                     "distance from the mean of the other places of the input, in sigma"),
+        "contrast_chance": (per_unknown, chance, "probability of so large a contrast in any place "
+                            "of the input if all are as the prior says"),
+        "rms_in_deviations": (per_sensor, [fit.rms for fit in last.fits],
+                              "readings less what the posterior's mean gives, over their scatter"),
+        "readings": (per_sensor, [fit.readings for fit in last.fits], "readings that were used"),
+        "strays": (per_sensor, [fit.strays for fit in last.fits], "readings that were set aside"),
+        "chance": (per_sensor, [fit.chance for fit in last.fits], "probability of so large an rms "
+                   "in any sensor by the scatter of the readings alone"),
+        "pattern": ((), last.pattern, "how alike successive misfits of a sensor are, N(0, 1) if "
+                    "nothing but scatter makes them"),
+        "chance_of_all": ((), last.chance, "probability of so large an rms of all readings, or of "
+                          "such a pattern, by the scatter of the readings alone"),
+        "stage_learnt": (("stage", "unknown"),
+                         [np.sqrt(np.diag(unknowns.spread(s)[1])) for s in course.stages],
+                         "learnt, after each stage"),
+        "lost": (per_stage, course.lost, "runs that failed"),
+        "unused": ((), course.unused, "readings that some run has no value for"),
+    }  # fmt: skip
+    words = {"unknown": names, "other": names, "sensor": sensors,
+             "input": [axis.input for axis in unknowns.axes],
+             "unknown_units": [axis.units for axis in unknowns.axes]}  # fmt: skip
+    own = [k for k, name in enumerate(names) if not name.startswith("clock.")]
+    pairs = [{"between": [names[i], names[j]], "coefficient": float(correlation[i, j])}
+             for i in own for j in own if i < j]  # fmt: skip
+    says = {names[k]: laws[k].model_dump(exclude_none=True) for k in own}
+    attributes = {
+        "title": asked.title or asked.name, "question": asked.question, "seed": asked.seed,
+        "runs": given.members * len(course.stages), "stages": len(course.stages),
+        "scene": given.campaign.scene.to_toml(), "fidelity": asked.fidelity,
+        "measured": given.measurement.file.name, "inputs": json.dumps(says),
+        "correlations": json.dumps(pairs), **build.provenance(),
+    }  # fmt: skip
+    path = course.folder / POSTERIOR
+    with writing(path), whole(path) as draft, netCDF4.Dataset(draft, "w") as file:
+        file.setncatts(attributes)
+        sizes = {"sample": MEMBERS, "unknown": len(names), "other": len(names),
+                 "level": len(_LEVELS), "sensor": len(sensors),
+                 "stage": len(course.stages)}  # fmt: skip
+        for name, size in sizes.items():
+            file.createDimension(name, size)
+        add_inputs(file, table, compression=4)
+        file.createVariable("level", "f8", ("level",))[:] = _LEVELS
+        for name, texts in words.items():
+            along = name if name in sizes else "unknown"
+            file.createVariable(name, str, (along,))[:] = np.array(texts, dtype=object)
+        for name, (dims, values, meaning) in numbers.items():
+            array = np.asarray(values)
+            made = file.createVariable(name, "i8" if array.dtype.kind == "i" else "f8", dims)
+            made[...] = array
+            made.setncatts({"long_name": meaning, "units": "1"})
+
+
+def _moved(axis: Axis, mean: float, deviation: float, test: str) -> Calibrated:
+    """The prior of an axis moved and narrowed; of one that an earlier test has moved, by both."""
+    law, shift, scatter, before = axis.law, 0.0, 1.0, axis.law
+    if isinstance(before, Calibrated):
+        law, shift, scatter = before.of, before.shift, before.remaining_scatter
+        test = f"{before.data}, {test}"
+    assert isinstance(law, Ranged)  # as Unknowns.of has seen
+    return Calibrated(
+        of=law, shift=shift + scatter * mean, remaining_scatter=scatter * deviation, data=test,
+        shared=axis.shared,
+    )  # fmt: skip
+
+
+def _write_sensors(course: _Course) -> None:
+    """The file of a plan of sensors, the one that tells most first."""
+    found, names = rank(course.points[-1], course.told), Unknowns.of(course.given).names
+    rows = xr.Dataset(
+        {
+            "learnt": (("sensor", "unknown"), found.after, {
+                "long_name": "posterior over prior scatter with this sensor and all above",
+                "units": "1"}),
+            "alone": (("sensor", "unknown"), found.alone[found.order], {
+                "long_name": "the same with this sensor alone", "units": "1"}),
+        },
+        {"sensor": [course.told[k].sensor for k in found.order], "unknown": names},
+        {"scene": course.given.campaign.scene.to_toml(), **build.provenance()},
+    )  # fmt: skip
+    path = course.folder / SENSORS
+    with writing(path), whole(path) as draft:
+        rows.to_netcdf(draft, engine="netcdf4")
+
+
+class Calibration:
+    """Unknown inputs from measured data; ``run`` runs it, or finishes it.
+
+    Parameters
+    ----------
+    scene, inputs, seed, name, keys
+        As of ``ringsim.Campaign``: ``inputs`` are the priors of what is unknown.
+    measured
+        File of measured data, see ``ringsim.load_measured``.
+    runs, stages
+        Runs of all stages together; how often the ensemble is drawn anew.
+
+    Raises
+    ------
+    InputError
+        Naming key, value, bound and cure, if something is refused.
+
+    Examples
+    --------
+    >>> Calibration("ring18", {}, "stand.toml", runs=5)
+    Traceback (most recent call last):
+    ringsim.refusal.InputError: ringsim.Calibration: runs = 5 must be at least 16
+    """
+
+    def __init__(
+        self, scene: Scene | str | Path, inputs: Mapping[str, Any], measured: str | Path,
+        runs: int = 256, stages: int = 4, seed: int = 0, *, name: str = "calibration", **keys: Any,
+    ) -> None:  # fmt: skip
+        given = scene if isinstance(scene, Scene) else None
+        text = campaign_text(scene, {
+            "name": name, "seed": seed, "inputs": inputs, "measured": measured, "runs": runs,
+            "stages": stages,
+        } | keys)  # fmt: skip
+        self._given = calibration_of(text, Path(_NAME), scene=given)
+
+    @classmethod
+    def read(cls, file: str | Path, settings: Mapping[str, Any] | None = None) -> "Calibration":
+        """The calibration of a file, as ``ringsim calibrate FILE --set ...`` reads it.
+
+        InputError if it is refused.
+        """
+        found = cls.__new__(cls)
+        found._given = calibration_of(read_text(Path(file)), Path(file), settings)
+        return found
+
+    def run(self, workers: int | None = None, *, out: str | Path | None = None) -> xr.Dataset:
+        """Run all stages that are missing in the folder ``out`` (runs/NAME): the posterior.
+
+        Workers are as of ``Campaign.run``.  InputError if the folder or too few runs of a stage
+        that ended well are refused; KeyboardInterrupt after a signal: call again.
+        """
+        return self._run(workers, out, planning=False)
+
+    def sensors(self, workers: int | None = None, *, out: str | Path | None = None) -> xr.Dataset:
+        """How much each sensor would tell; see ``run``, the folder is runs/NAME-sensors."""
+        return self._run(workers, out, planning=True)
+
+    def _run(self, workers: int | None, out: str | Path | None, *, planning: bool) -> xr.Dataset:
+        folder = None if out is None else Path(out)
+        ended, path = run_course(lambda: self._given, workers, folder, planning=planning)
+        if ended.refused is not None:
+            raise ended.refused
+        if ended.code == EXIT_INTERRUPTED:
+            raise KeyboardInterrupt
+        return xr.load_dataset(path)

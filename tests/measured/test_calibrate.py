@@ -1,0 +1,442 @@
+"""Calibrations from file to posterior: tests of known truth, kills, workers, and refusals."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from loops import for_each
+
+import ringsim
+from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
+from ringsim.cli import cli
+from ringsim.plots.comparison import learnt
+from ringsim.sampling.distributions import Calibrated, Lognormal, Truncated, Uniform
+from ringsim.scene import load_scene
+from ringsim.simulation import simulate
+
+SETTINGS = {
+    "structure.sections": 3, "structure.opening_angle": 100.0, "boom": "none",
+    "solver.end_time": 1.5,
+}  # fmt: skip
+PRIORS = {
+    "cables.upper.winch.winding.speed":
+        {"kind": "normal", "mean": 0.12, "standard_deviation": 0.01},
+    "structure.opening_angle": {"kind": "uniform", "low": 97.0, "high": 103.0},
+    "rods.poisson_ratio": {"kind": "lognormal", "mean": 0.3, "standard_deviation": 0.02},
+}  # fmt: skip
+TRUTH = {"cables.upper.winch.winding.speed": 0.127, "structure.opening_angle": 99.0}
+TIMES = np.arange(0.1, 1.42, 0.05)
+CLOCK = {"offset": 0.3, "drift": -0.02}
+"""Of the stand: what the file does not say."""
+
+
+def scene():
+    return load_scene("ring18-cable").with_values(SETTINGS)
+
+
+def write_test(folder, values, *, clock=None, deviation=0.1, seed=1, planned=False):
+    """Readings of the V-joints of a run, which the clock of the stand shows; its TOML file."""
+    folder.mkdir(exist_ok=True)
+    run = simulate(scene().with_values(values | {"record.interval": 0.01}), fidelity="frame")
+    stream, places = np.random.default_rng(seed), [("upper", 1), ("upper", 2), ("lower", 1)]
+    clock = clock or {"offset": 0.0, "drift": 0.0}
+    columns = [(TIMES - clock["offset"]) / (1.0 + clock["drift"])]
+    lines = ['name = "stand"']
+    if planned:
+        lines += ["clock = { interval = 0.05, end = 1.4 }"]
+    else:
+        lines += ['file = "stand.csv"', 'clock = { column = "t" }']
+    for plane, section in places:
+        angle = run["opening_angle"].sel(plane=plane, section=section).dropna("time")
+        exact = np.interp(TIMES, angle["time"], angle)
+        columns.append(exact + deviation * stream.standard_normal(len(TIMES)))
+        lines += ["[[sensors]]", f'column = "{plane}{section}"', 'variable = "opening_angle"',
+                  f'place = {{ plane = "{plane}", section = {section} }}', 'unit = "deg"',
+                  f"standard_deviation = {deviation}"]  # fmt: skip
+    head = ",".join(["t", *(f"{p}{s}" for p, s in places)])
+    np.savetxt(folder / "stand.csv", np.column_stack(columns), delimiter=",", header=head,
+               comments="", fmt="%.6f")  # fmt: skip
+    (folder / "stand.toml").write_text("\n".join(lines))
+    return folder / "stand.toml"
+
+
+def write_file(folder, runs=48, stages=3, more="", inputs=PRIORS):
+    """A calibration file beside ``stand.toml``."""
+    rows = [f'"{path}" = {table(law)}' for path, law in inputs.items()]
+    (folder / "ring.toml").write_text(scene().to_toml())
+    (folder / "cal.toml").write_text("\n".join([
+        'name = "cal"', 'scene = "ring.toml"', "seed = 5", 'measured = "stand.toml"',
+        f"runs = {runs}", f"stages = {stages}", more, "[inputs]", *rows,
+    ]))  # fmt: skip
+    return folder / "cal.toml"
+
+
+def table(law):
+    parts = (f"{k} = {str(v).lower() if isinstance(v, bool) else repr(v).replace(chr(39), chr(34))}"
+             for k, v in law.items())  # fmt: skip
+    return f"{{ {', '.join(parts)} }}"
+
+
+@pytest.fixture(scope="module")
+def test_files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stand")
+    write_test(folder, TRUTH)
+    return write_file(folder)
+
+
+@pytest.fixture(scope="module")
+def found(test_files, tmp_path_factory):
+    """The posterior of the test, in this process."""
+    out = tmp_path_factory.mktemp("found")
+    return ringsim.Calibration.read(test_files).run(workers=0, out=out / "cal"), out / "cal"
+
+
+def test_truth_lies_within_what_was_found(found):
+    posterior, _ = found
+    for name, value in TRUTH.items():
+        low, _, high = posterior["posterior_quantile"].sel(unknown=name).values
+        wide = high - low
+        assert low - 0.3 * wide < value < high + 0.3 * wide  # 3 sigma
+        assert posterior["learnt"].sel(unknown=name) < 0.3
+    assert float(posterior["learnt"].sel(unknown="rods.poisson_ratio")) > 0.95  # no angle tells it
+    assert float(posterior["chance_of_all"]) > 1e-3
+    assert int(posterior["lost"].sum()) == 0
+
+
+def test_samples_quantiles_and_numbers_of_the_file_agree(found):
+    posterior, _ = found
+    for k, name in enumerate(posterior["unknown"].values):
+        variable = next(v for v in posterior if posterior[v].attrs.get("path") == name)
+        law = PRIORS[name]
+        samples = posterior[variable].values
+        stated = posterior["posterior_quantile"].values[k]
+        shares = [(samples < edge).mean() for edge in stated]
+        np.testing.assert_allclose(shares, [0.05, 0.5, 0.95], atol=0.05)
+        if law["kind"] == "normal":  # x = mean + s (m + s' u): remaining scatter by hand
+            assert posterior["learnt"].values[k] == pytest.approx(
+                (stated[2] - stated[0]) / 2 / 1.6449 / law["standard_deviation"], rel=1e-3
+            )
+            edges = law["mean"] + law["standard_deviation"] * np.array([-1.6449, 0.0, 1.6449])
+            np.testing.assert_allclose(posterior["prior_quantile"].values[k], edges, rtol=1e-4)
+    last = posterior["stage_learnt"].isel(stage=-1).values
+    np.testing.assert_array_equal(last, posterior["learnt"].values)
+
+
+def test_stages_are_campaigns_of_their_own(found):
+    _, folder = found
+    for stage in (1, 3):
+        runs = ringsim.open_campaign(folder / f"stage-{stage}")
+        assert runs.sizes["sample"] == 16
+    done = CliRunner().invoke(cli, ["status", str(folder / "stage-2")])
+    assert done.exit_code == 0
+    assert "16 of 16" in done.output
+
+
+def test_what_is_printed_is_what_the_file_holds(test_files, found):
+    posterior, folder = found
+    done = CliRunner().invoke(cli, ["calibrate", str(test_files), "--out", str(folder)])
+    assert done.exit_code == 0, done.output
+    row = next(r for r in done.output.splitlines() if r.startswith("structure.opening_angle"))
+    cells = [cell.strip() for cell in row.split("  ") if cell.strip()]
+    low, middle, high = (
+        posterior["posterior_quantile"].sel(unknown="structure.opening_angle").values
+    )
+    assert cells[1] == "deg"
+    assert float(cells[3]) == pytest.approx(middle, rel=1e-3)
+    assert [float(v) for v in cells[4].split(" .. ")] == pytest.approx([low, high], rel=2e-3)
+    assert "hardly learnt from these sensors: rods.poisson_ratio" in done.output
+    assert "the posterior explains every sensor" in done.output
+    assert f"wrote {folder / POSTERIOR}" in done.output
+
+
+def equal(one, other):
+    with xr.open_dataset(one) as a, xr.open_dataset(other) as b:
+        assert a.equals(b)
+        return True
+
+
+def command(*words):
+    return [sys.executable, "-m", "ringsim", "calibrate", *map(str, words)]
+
+
+def test_killed_in_a_stage_and_finished_by_other_workers_it_is_the_same(
+    test_files, found, tmp_path
+):
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        command(test_files, "--out", out, "--workers", 2), start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    end = time.monotonic() + 120.0
+    while not (out / "stage-2" / "design.nc").exists():  # killed while the second one runs
+        assert process.poll() is None
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (out / POSTERIOR).exists()
+    subprocess.run(command(test_files, "--out", out, "--workers", 1), check=True,
+                   capture_output=True, timeout=300)  # fmt: skip
+    assert equal(out / POSTERIOR, found[1] / POSTERIOR)
+
+
+MPIEXEC = shutil.which(
+    "mpiexec", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+)
+
+
+@pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: ringsim[mpich]")
+def test_ranks_of_mpi_find_the_same(test_files, found, tmp_path):
+    done = subprocess.run(
+        [MPIEXEC, "-n", "2", *command(test_files, "--out", tmp_path / "out")],
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("wrote ") == 1
+    assert equal(tmp_path / "out" / POSTERIOR, found[1] / POSTERIOR)
+
+
+def test_clock_of_the_stand_is_found_too(tmp_path):
+    """Offset and drift are unknowns of the readings alone: no run knows them."""
+    write_test(tmp_path, TRUTH, clock=CLOCK)
+    more = (
+        "[clock]\n"
+        'offset = { kind = "normal", mean = 0.0, standard_deviation = 0.3 }\n'
+        'drift = { kind = "normal", mean = 0.0, standard_deviation = 0.02 }\n'
+    )
+    inputs = {k: v for k, v in PRIORS.items() if k != "rods.poisson_ratio"}
+    file = write_file(tmp_path, 48, 3, more, inputs)
+    posterior = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / "out")
+    for name, value in (TRUTH | {f"clock.{k}": v for k, v in CLOCK.items()}).items():
+        low, _, high = posterior["posterior_quantile"].sel(unknown=name).values
+        assert low - 0.3 * (high - low) < value < high + 0.3 * (high - low), name
+    assert float(posterior["chance_of_all"]) > 1e-3
+    assert posterior.attrs["inputs"].count("clock") == 0  # no campaign draws them
+
+
+def test_friction_that_the_model_does_not_know_is_told(tmp_path):
+    write_test(tmp_path, TRUTH | {"cables.upper.friction.coefficient": 2e-3})
+    file = write_file(tmp_path, inputs={k: v for k, v in PRIORS.items() if "poisson" not in k})
+    done = CliRunner().invoke(
+        cli, ["calibrate", str(file), "--out", str(tmp_path / "out"), "--workers", "1"]
+    )
+    assert done.exit_code == 0
+    assert "NOT EXPLAINED" in done.output
+
+
+# What stands on it.
+
+
+def test_campaign_draws_what_was_found(found, tmp_path):
+    posterior, folder = found
+    shutil.copy(folder / POSTERIOR, tmp_path)
+    (tmp_path / "ring.toml").write_text(scene().to_toml())
+    (tmp_path / "flight.toml").write_text(
+        'name = "flight"\nscene = "ring.toml"\nfidelity = "frame"\n'
+        'design = { kind = "sobol", samples = 256 }\n'
+        '[inputs]\nfrom = { file = "posterior.nc", without = ["rods.poisson_ratio"] }\n'
+        '"rods.damping" = { kind = "uniform", low = 0.0005, high = 0.002 }\n'
+    )
+    table_ = ringsim.campaign.specification.load_campaign(tmp_path / "flight.toml").draw()
+    drawn = {column.path: column.values for column in table_.columns}
+    assert set(drawn) == {"rods.damping", *TRUTH}
+    for name in TRUTH:
+        stated = posterior["posterior_quantile"].sel(unknown=name).values
+        np.testing.assert_allclose(np.quantile(drawn[name], [0.05, 0.5, 0.95]), stated, rtol=2e-3)
+    held = [list(posterior["unknown"].values).index(name) for name in TRUTH]
+    wanted = posterior["correlation"].values[held[0], held[1]]
+    assert np.corrcoef(*(drawn[name] for name in TRUTH))[0, 1] == pytest.approx(wanted, abs=0.05)
+    assert abs(wanted) > 0.3  # or the line above says nothing
+
+
+def test_second_test_begins_where_the_first_ended(found, tmp_path):
+    """Twice the same readings are worth readings of half the variance."""
+    posterior, folder = found
+    write_test(tmp_path, TRUTH)
+    shutil.copy(folder / POSTERIOR, tmp_path)
+    file = write_file(tmp_path, inputs={})
+    file.write_text(file.read_text() + '\nfrom = "posterior.nc"\n')
+    second = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / "out")
+    for name in TRUTH:
+        was = posterior["posterior_quantile"].sel(unknown=name).values
+        now = second["posterior_quantile"].sel(unknown=name).values
+        assert (now[2] - now[0]) / (was[2] - was[0]) == pytest.approx(np.sqrt(0.5), rel=0.06)
+        assert now[1] == pytest.approx(was[1], abs=0.1 * (was[2] - was[0]))
+    assert '"data": "stand, stand"' in second.attrs["inputs"]
+
+
+def test_plan_of_sensors_foretells_what_a_test_tells(test_files, found, tmp_path):
+    write_test(tmp_path, TRUTH, planned=True)
+    file = write_file(tmp_path)
+    done = CliRunner().invoke(
+        cli, ["sensors", str(file), "--out", str(tmp_path / "plan"), "--workers", "1"]
+    )
+    assert done.exit_code == 0, done.output
+    plan = xr.load_dataset(tmp_path / "plan" / SENSORS)
+    assert done.output.index(str(plan["sensor"].values[0])) < done.output.index(
+        str(plan["sensor"].values[1])
+    )
+    for name in TRUTH:  # the truth is one sigma off the medians, where the plan stands
+        assert float(plan["learnt"].sel(unknown=name)[-1]) == pytest.approx(
+            float(found[0]["learnt"].sel(unknown=name)), rel=0.25
+        )
+    assert (plan["learnt"].diff("sensor") < 1e-6).all()
+    refused = CliRunner().invoke(cli, ["calibrate", str(file), "--out", str(tmp_path / "cal")])
+    assert refused.exit_code == 2
+    assert "still to come" in refused.output
+
+
+@for_each(
+    "more, inputs, words",
+    [
+        (
+            'design = { kind = "random", samples = 4 }',
+            PRIORS,
+            "design: a calibration places its own",
+        ),
+        ("check_every = 4", PRIORS, "check_every: leave it out"),
+        ("", {}, "there is nothing to find"),
+        (
+            "",
+            {"loads.force": {"kind": "discrete", "values": [0.1, 0.2]}},
+            "continuous distribution",
+        ),
+        ("clock = { offset = 3 }", PRIORS, "clock.offset"),
+        ("mesured = 1", PRIORS, "mesured"),
+    ],
+)
+def test_what_is_refused(more, inputs, words, tmp_path):
+    write_test(tmp_path, {})
+    file = write_file(tmp_path, more=more, inputs=inputs)
+    done = CliRunner().invoke(cli, ["calibrate", str(file), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2, done.output
+    assert words in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_too_few_runs_and_readings_out_of_time_are_refused(tmp_path):
+    write_test(tmp_path, {})
+    file = write_file(tmp_path, runs=16, stages=4)
+    done = CliRunner().invoke(cli, ["calibrate", str(file), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "set runs = 32 at least" in done.output
+    stand = tmp_path / "stand.toml"
+    stand.write_text(stand.read_text().replace('"t" }', '"t", offset = 99.0 }'))
+    file = write_file(tmp_path, runs=32, inputs={k: PRIORS[k] for k in list(PRIORS)[:1]},
+                      more='set = { "solver.end_time" = 0.5 }')  # fmt: skip
+    done = CliRunner().invoke(
+        cli, ["calibrate", str(file), "--out", str(tmp_path / "late"), "--workers", "0"]
+    )
+    assert done.exit_code == 2
+
+
+@for_each(
+    "said, words",
+    [
+        ('from = "none.nc"', "none.nc cannot be read"),
+        ('from = { file = "posterior.nc", without = ["x"] }', "x is no unknown of posterior.nc"),
+        ('from = { fil = "posterior.nc" }', "fil"),
+        (
+            'from = "posterior.nc"\n"structure.opening_angle" = { kind = "uniform", low = 1.0, '
+            "high = 2.0 }",
+            "is given by inputs and by inputs.from",
+        ),
+        ('from = "runs.nc"', "has no posterior"),
+    ],
+)
+def test_what_of_a_posterior_is_refused(said, words, found, tmp_path):
+    _, folder = found
+    shutil.copy(folder / POSTERIOR, tmp_path)
+    shutil.copy(folder / "stage-1" / "campaign.nc", tmp_path / "runs.nc")
+    (tmp_path / "c.toml").write_text(
+        'name = "c"\nscene = "truss2"\ndesign = { kind = "random", samples = 2 }\n[inputs]\n' + said
+    )
+    done = CliRunner().invoke(cli, ["campaign", str(tmp_path / "c.toml"), "--dry-run"])
+    assert done.exit_code == 2, done.output
+    assert words in done.output, done.output
+
+
+def test_unknown_that_another_scene_lacks_is_named_with_its_cure(found, tmp_path):
+    _, folder = found
+    shutil.copy(folder / POSTERIOR, tmp_path)
+    (tmp_path / "c.toml").write_text(
+        'name = "c"\nscene = "planar-truss"\ndesign = { kind = "random", samples = 2 }\n'
+        '[inputs]\nfrom = "posterior.nc"'
+    )
+    done = CliRunner().invoke(cli, ["campaign", str(tmp_path / "c.toml"), "--dry-run"])
+    assert done.exit_code == 2, done.output
+    assert "leave it out by without = [" in done.output, done.output
+
+
+@for_each(
+    "of",
+    [
+        Lognormal(mean=2.0, standard_deviation=0.5),
+        Uniform(low=-1.0, high=3.0),
+        Truncated(of=Lognormal(mean=2.0, standard_deviation=0.5), high=2.5),
+    ],
+)
+def test_calibrated_distribution_is_one(of):
+    """Its probability undoes its quantile, and its density is the slope of its probability."""
+    law = Calibrated(of=of, shift=0.7, remaining_scatter=0.3)
+    shares = np.array([0.02, 0.3, 0.5, 0.9])
+    values = law.quantile(shares)
+    np.testing.assert_allclose([law.probability(v) for v in values], shares, rtol=1e-9)
+    step = 1e-6
+    slope = [(law.probability(v + step) - law.probability(v - step)) / (2 * step) for v in values]
+    np.testing.assert_allclose(np.exp(law.log_density(values)), slope, rtol=1e-6)
+    plain = Calibrated(of=of, shift=0.0, remaining_scatter=1.0)
+    np.testing.assert_allclose(plain.quantile(shares), of.quantile(shares), rtol=1e-12)
+
+
+STAND = Path(__file__).parents[2] / "campaigns" / "stand"
+
+
+@pytest.mark.slow
+def test_shipped_test_is_explained_and_holds_its_truth(tmp_path):
+    """That of docs/guide/calibrate.md, made by the other engine."""
+    posterior = ringsim.Calibration.read(STAND / "friction.toml").run(2, out=tmp_path / "out")
+    truth = tomllib.loads((STAND / "truth.toml").read_text(encoding="utf-8"))
+    known = truth["values"] | {"clock.offset": truth["clock"]["offset"]}
+    assert set(known) == set(posterior["unknown"].values)
+    for name, value in known.items():
+        low, _, high = posterior["posterior_quantile"].sel(unknown=name).values
+        assert low < value < high, name
+    assert float(posterior["chance_of_all"]) > 1e-3
+    assert float(posterior["learnt"].sel(unknown="joints.vjoint.viscous")) < 0.1
+
+
+def test_shipped_test_can_be_read():
+    given = calibration_of((STAND / "friction.toml").read_text(encoding="utf-8"),
+                           STAND / "friction.toml")  # fmt: skip
+    assert len(given.measurement.readings) == 14
+    assert given.members == 48
+
+
+def test_figure_shows_what_the_file_holds(found, tmp_path):
+    posterior, folder = found
+    figure = learnt(posterior)
+    left, right = figure.axes
+    shown = [label.get_text().splitlines()[0] for label in left.get_yticklabels()]
+    assert shown == posterior["unknown"].values.tolist()
+    for k, (bar, line) in enumerate(zip(left.containers[::2], left.containers[1::2], strict=True)):
+        assert bar[0].get_x() == pytest.approx(-1.6449)
+        (low, high) = line.lines[2][0].get_segments()[0][:, 0]
+        assert 0.5 * (low + high) == pytest.approx(float(posterior["shift"][k]))
+        assert high - low == pytest.approx(2 * 1.6449 * float(posterior["learnt"][k]))
+    marks = right.collections[0].get_offsets()
+    np.testing.assert_allclose(marks[:, 0], posterior["rms_in_deviations"])
+    done = CliRunner().invoke(cli, ["plot", str(folder / POSTERIOR), "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "posterior-fig-learnt.png").stat().st_size > 10_000

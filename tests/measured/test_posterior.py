@@ -1,0 +1,198 @@
+"""What data tell of unknowns: closed forms of linear models, strays, contrasts, sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ringsim.analysis.posterior import (
+    FALSE_ALARM,
+    UNEXPLAINED,
+    WIDER,
+    Learnt,
+    Told,
+    contrasts,
+    learn,
+    posterior_of,
+    rank,
+)
+
+pytestmark = pytest.mark.quick
+
+UNKNOWNS, READINGS = 5, 40
+
+
+def slopes(seed=1, unknowns=UNKNOWNS, readings=READINGS):
+    return np.random.default_rng(seed).standard_normal((readings, unknowns)) * np.linspace(
+        0.02, 1.5, unknowns
+    )
+
+
+def closed_form(slope, data, noise):
+    """Mean and covariance for y = A u + e, u ~ N(0, 1), e ~ N(0, noise)."""
+    weighed = np.linalg.solve(noise, slope)
+    covariance = np.linalg.inv(np.eye(slope.shape[1]) + slope.T @ weighed)
+    return covariance @ weighed.T @ data, covariance
+
+
+def staged(model, told_by, unknowns, members, stages=4, seed=2):
+    """The result of stages on a model (points to outputs)."""
+    stream = np.random.default_rng(seed)
+    points = stream.standard_normal((members, unknowns))
+    found = learn(points, told_by(model(points)))
+    for _ in range(stages - 1):
+        points = found.posterior.draw(members, stream, WIDER)
+        found = learn(points, told_by(model(points)))
+    return found
+
+
+def sensors(outputs, data, count=4, deviation=1.0, bias=0.0):
+    return [
+        Told(f"s{k}", o, d, deviation, bias)
+        for k, (o, d) in enumerate(zip(np.split(outputs, count, axis=1), np.split(data, count),
+                                       strict=True))
+    ]  # fmt: skip
+
+
+def test_linear_model_gives_the_closed_form():
+    slope, stream = slopes(), np.random.default_rng(3)
+    data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(READINGS)
+    found = staged(lambda u: u @ slope.T, lambda y: sensors(y, data), UNKNOWNS, 4096)
+    mean, covariance = closed_form(slope, data, np.eye(READINGS))
+    scatter = np.sqrt(np.diag(covariance))
+    assert np.abs(found.posterior.mean - mean).max() < 0.02 * scatter.min()
+    np.testing.assert_allclose(found.posterior.covariance, covariance, rtol=0.02, atol=1e-9)
+
+
+def test_noise_that_the_map_cannot_see_is_what_runs_off_it_have():
+    """Runs that scatter by sqrt(3) off the map are worth a reading of four times the variance."""
+    slope, stream = slopes(), np.random.default_rng(4)
+    data = slope @ stream.standard_normal(UNKNOWNS)
+    points = stream.standard_normal((4096, UNKNOWNS))
+    outputs = points @ slope.T + np.sqrt(3.0) * stream.standard_normal((4096, READINGS))
+    found = posterior_of(points, outputs, data)
+    _, covariance = closed_form(slope, data, 4.0 * np.eye(READINGS))
+    scatter = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), scatter, rtol=0.04)
+    np.testing.assert_allclose(found.off, np.sqrt(3.0), rtol=0.1)
+
+
+def test_unknown_bias_is_a_scatter_that_all_readings_of_a_sensor_share():
+    slope, stream = slopes(), np.random.default_rng(5)
+    data, bias, deviation = 30.0 * stream.standard_normal(READINGS), 1.7, 0.6
+    block = deviation**2 * np.eye(10) + bias**2 * np.ones((10, 10))
+    noise = np.kron(np.eye(4), block)
+    points = stream.standard_normal((500, UNKNOWNS))
+    told = sensors(points @ slope.T, data, 4, deviation, bias)
+    found = posterior_of(
+        points, np.concatenate([t.scaled(t.computed) for t in told], axis=1),
+        np.concatenate([t.scaled(t.measured) for t in told]),
+    )  # fmt: skip
+    mean, covariance = closed_form(slope, data, noise)
+    np.testing.assert_allclose(found.mean, mean, rtol=1e-6)
+    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-6, atol=1e-12)
+
+
+def made(strays=(), shift=0.0, seed=6):
+    """A test of four sensors: readings with strays, and a shift of the last sensor."""
+    slope, stream = slopes(), np.random.default_rng(seed)
+    data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(READINGS)
+    data[-10:] += shift
+    for place, size in strays:
+        data[place] += size
+    return slope, data
+
+
+def run(slope, data, count=4):
+    return staged(lambda u: u @ slope.T, lambda y: sensors(y, data, count), UNKNOWNS, 200)
+
+
+def test_strays_are_set_aside_and_what_is_left_is_what_is_without_them():
+    slope, clean = made()
+    _, data = made([(2, 60.0), (15, -25.0), (33, 12.0)])
+    found = run(slope, data, 2)
+    assert [fit.strays for fit in found.fits] == [2, 1]
+    kept = np.setdiff1d(np.arange(READINGS), [2, 15, 33])
+    mean, covariance = closed_form(slope[kept], clean[kept], np.eye(len(kept)))
+    np.testing.assert_allclose(found.posterior.mean, mean, atol=1e-8)
+    np.testing.assert_allclose(found.posterior.covariance, covariance, atol=1e-8)
+    assert not told_wrong(found)
+
+
+def told_wrong(found: Learnt) -> bool:
+    return min(found.chance, *(fit.chance for fit in found.fits)) < UNEXPLAINED
+
+
+def test_sensor_that_is_off_as_a_whole_has_no_strays_and_is_not_explained():
+    slope, data = made(shift=12.0)
+    found = run(slope, data)
+    assert sum(fit.strays for fit in found.fits) == 0
+    assert told_wrong(found)
+    assert min(found.fits, key=lambda fit: fit.chance).sensor == "s3"
+
+
+def test_tests_without_faults_are_explained_and_keep_their_readings():
+    told = [run(*made(seed=seed)) for seed in range(100, 200)]
+    assert sum(map(told_wrong, told)) <= 2  # at 1e-3 each of five
+    assert sum(fit.strays > 0 for found in told for fit in found.fits) <= 5  # expected: 1
+
+
+def test_misfit_below_the_scatter_shows_by_its_pattern():
+    """A slow wave of half a sigma in 400 readings: no sensor's rms is unusual, neighbours are."""
+    slope = slopes(readings=400)
+    stream = np.random.default_rng(8)
+    data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(400)
+    wave = 0.6 * np.sin(np.linspace(0.0, 40.0, 400))
+    wrong = staged(lambda u: u @ slope.T, lambda y: sensors(y, data + wave), UNKNOWNS, 200)
+    sound = staged(lambda u: u @ slope.T, lambda y: sensors(y, data), UNKNOWNS, 200)
+    assert wrong.chance < UNEXPLAINED < sound.chance
+    assert wrong.pattern > 3.0 > abs(sound.pattern)
+    assert min(fit.chance for fit in wrong.fits) > UNEXPLAINED
+
+
+def places(seed, bad=0.0, common=0.0, count=12):
+    """A test of ``count`` places of one input, of which the fourth is off, or all are."""
+    stream = np.random.default_rng(seed)
+    slope = stream.standard_normal((60, count))
+    truth = stream.standard_normal(count) + common
+    truth[3] = bad or truth[3]
+    data = slope @ truth + stream.standard_normal(60)
+    points = stream.standard_normal((100, count))
+    return posterior_of(points, points @ slope.T, data)
+
+
+def test_contrast_is_normal_if_all_is_as_the_priors_say():
+    every = np.array([contrasts(places(seed), range(12)) for seed in range(400)])
+    assert np.std(every[:, 0]) == pytest.approx(1.0, abs=0.03)
+    alarms = (every[:, 1] < FALSE_ALARM).any(axis=1).sum()
+    assert alarms <= 10  # 4 expected at most; 11 or more: 0.003
+    assert (every[:, 1] < 10 * FALSE_ALARM).any(axis=1).sum() >= 20  # and not far fewer: 40
+
+
+def test_bad_place_stands_out_also_if_all_places_have_moved():
+    for common in (0.0, 4.0):
+        found = [contrasts(places(seed, bad=common + 8.0, common=common), range(12))
+                 for seed in range(30)]  # fmt: skip
+        assert all(chance[3] < FALSE_ALARM for _, chance in found)
+        assert all(np.abs(sigma).argmax() == 3 for sigma, _ in found)
+    moved = [contrasts(places(seed, common=4.0), range(12)) for seed in range(100)]
+    assert sum((chance < FALSE_ALARM).any() for _, chance in moved) <= 5
+
+
+def test_sensors_come_in_the_order_of_what_they_leave():
+    """Against every pair and every single one by the closed form."""
+    slope, count = 4.0 * slopes(9, unknowns=3, readings=60), 6
+    points = np.random.default_rng(10).standard_normal((400, 3))
+    found = rank(points, sensors(points @ slope.T, np.zeros(60), count))
+
+    def left(chosen):
+        own = np.concatenate([np.arange(10 * k, 10 * k + 10) for k in chosen])
+        return np.sqrt(np.diag(closed_form(slope[own], np.zeros(len(own)), np.eye(len(own)))[1]))
+
+    alone = np.array([left([k]) for k in range(count)])
+    np.testing.assert_allclose(found.alone, alone, rtol=1e-6)
+    assert found.order[0] == np.log(alone).sum(axis=1).argmin()
+    second = {k: np.log(left([found.order[0], k])).sum() for k in found.order[1:]}
+    assert found.order[1] == min(second, key=second.get)
+    for k in range(count):
+        np.testing.assert_allclose(found.after[k], left(found.order[: k + 1]), rtol=1e-6)
