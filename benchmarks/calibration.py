@@ -39,7 +39,7 @@ import scipy.stats
 import xarray as xr
 
 import ringsim
-from ringsim.analysis.posterior import FALSE_ALARM, UNEXPLAINED
+from ringsim.analysis.posterior import explained
 from ringsim.campaign.calibration import MEMBERS
 from ringsim.sampling.distributions import Lognormal, Normal, Uniform
 
@@ -142,9 +142,8 @@ def one(kind: str, number: int, runs: int) -> dict[str, Any]:
         )
         with contextlib.redirect_stderr(io.StringIO()):
             posterior = calibration.run(workers=0, out=folder / "out")
-    chances = np.append(posterior["chance"], posterior["chance_of_all"])
-    found["unexplained"] = bool((chances < UNEXPLAINED).any())
-    found["pattern"] = float(posterior["pattern"])
+    chances = posterior["chance"].values.tolist(), posterior["chance_of_all"].values.tolist()
+    found["unexplained"] = not explained(*chances)
     found["lost"] = int(posterior["lost"].sum())
     found["strays"] = int(posterior["strays"].sum())
     if pulleys:
@@ -190,13 +189,15 @@ def flight(number: int, runs: int) -> dict[str, Any]:
 
 
 def _standing(posterior: xr.Dataset, place: list[Any] | None) -> dict[str, Any]:
-    chance = posterior["contrast_chance"].values
-    found: dict[str, Any] = {"alarms": int((chance < FALSE_ALARM).sum()),
-                             "least_chance": float(chance.min())}  # fmt: skip
+    group = posterior["group"].values
+    found: dict[str, Any] = {
+        "alarms": int((group > 0).sum()),
+        "least_chance": float(posterior["contrast_chance"].min()),
+    }
     if place is not None:
         own = np.flatnonzero(posterior["input"].values == place[0])[place[1]]
         found |= {"sigma": float(posterior["contrast"].values[own]),
-                  "stands_out": bool(chance[own] < FALSE_ALARM),
+                  "stands_out": bool(group[own] > 0),
                   "first": bool(np.abs(posterior["contrast"].values).argmax() == own)}  # fmt: skip
     return found
 

@@ -55,16 +55,22 @@ _FEW = 0.1
 """Share of a sensor's readings from which on it is not strays that are wrong."""
 _LEAST_KNOWN = 1e-12
 """Variance of a contrast of which the data say nothing, in place of round-off."""
+_LEAST_LEFT = 1e-3
+"""Share of a contrast's variance below which another place has explained it."""
+_AS_GOOD = 4.0
+"""Difference of squared sigmas within which two places explain the data alike: the likelihood of
+one is at most e^2 times that of the other."""
+_LEAST_ROW = 5
+"""Readings of a sensor from which on their course tells anything."""
 _HARDLY = 0.9
 """Posterior over prior scatter from which on an unknown has hardly been learnt: a fifth of the
 variance at most is gone."""
 _TOGETHER = 0.8
 """Correlation of two unknowns from which on the data tell a combination of them and hardly more."""
+_FAR = 4.0
+"""Sigmas from the median of a prior beyond which it hardly holds a value: once in 16,000."""
 _LISTED = 6
 """Unknowns up to which each has a column in a table of sensors."""
-_SEEN = 0.1
-"""Scatter of an ensemble along a direction of the outputs, over that of the readings, below which
-the direction tells nothing: a hundredth of what one reading does."""
 
 
 class Posterior(NamedTuple):
@@ -108,24 +114,17 @@ def posterior_of(points: Array, outputs: Array, data: Array) -> Posterior:
     (array([0.9]), array([[0.1]]))
     """
     runs, unknowns = points.shape
-    middle = outputs.mean(axis=0)
-    _, sizes, across = np.linalg.svd(outputs - middle, full_matrices=False)
-    told = int((sizes > _SEEN * np.sqrt(runs - 1.0)).sum())
-    # Of more directions than that the residual covariance would be known too badly.
-    across = across[: max(1, min(told, runs // 4))]
-    reduced, wanted = (outputs - middle) @ across.T, (data - middle) @ across.T
     known = np.column_stack([np.ones(runs), points])
-    (start, *slopes), *_ = np.linalg.lstsq(known, reduced, rcond=None)
-    slopes = np.array(slopes)  # (unknowns, directions)
-    freedom = runs - unknowns - 1
-    left = reduced - known @ np.vstack([start, slopes])
-    error = np.eye(len(across)) + left.T @ left / freedom
-    weighed = np.linalg.solve(error, slopes.T)
+    (start, *slopes), *_ = np.linalg.lstsq(known, outputs, rcond=None)
+    left, freedom = outputs - known @ np.vstack([start, *slopes]), runs - unknowns - 1
+    # Along what the map tells nothing of there is no need to know how far runs lie off it.
+    along, sizes, across = np.linalg.svd(np.array(slopes), full_matrices=False)
+    slopes, aside = along * sizes, left @ across.T  # (unknowns, directions), (runs, directions)
+    weighed = np.linalg.solve(np.eye(len(across)) + aside.T @ aside / freedom, slopes.T)
     covariance = np.linalg.inv(np.eye(unknowns) + slopes @ weighed)
-    mean = covariance @ (weighed.T @ (wanted - start))
-    whole, *_ = np.linalg.lstsq(known, outputs, rcond=None)
-    off = np.sqrt(((outputs - known @ whole) ** 2).sum(axis=0) / freedom)
-    expected = np.concatenate([[1.0], mean]) @ whole
+    mean = covariance @ (weighed.T @ (across @ (data - start)))
+    off = np.sqrt((left**2).sum(axis=0) / freedom)
+    expected = start + mean @ slopes @ across
     return Posterior(mean, 0.5 * (covariance + covariance.T), expected, off)
 
 
@@ -171,7 +170,22 @@ class Fit(NamedTuple):
     rms: float
     """Of readings less what is expected, over the scatter of a reading."""
     chance: float
-    """Probability of so large an rms by the scatter alone; at most 1 for all sensors together."""
+    """Probability of so large an rms by the scatter alone."""
+    pattern: float
+    """How alike successive misfits are, N(0, 1) if nothing but scatter makes them; see ``_alike``.
+    """
+    off: float
+    """Root mean square of how far runs lie off the linear map, over the scatter of a reading."""
+
+
+def explained(sensors: Sequence[float], together: Sequence[float]) -> bool:
+    """Whether the posterior explains the readings, by the chances of each sensor and of all."""
+    least = min(min(sensors) * len(sensors), min(together) * len(together))
+    return bool(least >= UNEXPLAINED)
+
+
+def _is_explained(found: xr.Dataset) -> bool:
+    return explained(found["chance"].values.tolist(), found["chance_of_all"].values.tolist())
 
 
 class Learnt(NamedTuple):
@@ -179,12 +193,11 @@ class Learnt(NamedTuple):
 
     posterior: Posterior
     fits: list[Fit]
-    pattern: float
-    """How alike successive misfits of a sensor are, N(0, 1) if nothing but scatter makes them: sum
-    of products of neighbours over the root of their number."""
-    chance: float
-    """Probability of so large an rms of all readings, or of such a pattern, by scatter alone: a
-    model that is wrong by less than the scatter of a reading shows in its many readings."""
+    chances: dict[str, float]
+    """Probability by scatter alone of so large an rms of all readings ("rms"), of successive
+    misfits so alike in all sensors together ("pattern"), and in any sensor ("sensor pattern").  A
+    model that is wrong by less than the scatter of a reading shows in its many readings.
+    """
 
 
 def learn(points: Array, told: Sequence[Told]) -> Learnt:
@@ -217,34 +230,82 @@ def learn(points: Array, told: Sequence[Told]) -> Learnt:
             if (~kept[k]).sum() > _FEW * len(kept[k]):
                 kept[k][:] = True
                 whole.add(k)
-    rows, every = [], np.concatenate(apart)
-    products = np.concatenate([misfit[1:] * misfit[:-1] for misfit in apart])
-    pattern = float(products.sum() / np.sqrt(max(1, len(products))))
-    largest = float(scipy.special.chdtrc(len(every), float(every @ every)))
-    overall = min(1.0, 2.0 * min(largest, float(scipy.special.ndtr(-pattern))))
-    for each, mask, misfit in zip(told, kept, apart, strict=True):
-        beyond = float(scipy.special.chdtrc(len(misfit), float(misfit @ misfit)))
-        rms = float(np.sqrt(np.mean(misfit**2))) if len(misfit) else np.nan
-        chance = min(1.0, len(told) * beyond) if len(misfit) else 1.0
-        rows.append(Fit(each.sensor, len(misfit), int((~mask).sum()), rms, chance))
-    return Learnt(found, rows, pattern, overall)
+    rows, offs = [], np.split(found.off, ends)
+    for each, mask, misfit, off in zip(told, kept, apart, offs, strict=True):
+        count, there = len(misfit), bool(len(misfit))
+        chance = float(scipy.special.chdtrc(count, float(misfit @ misfit))) if there else 1.0
+        rms, wide = (float(np.sqrt(np.mean(v**2))) if there else np.nan for v in (misfit, off))
+        rows.append(Fit(each.sensor, count, int((~mask).sum()), rms, chance, _alike(misfit), wide))
+    every = np.concatenate(apart)
+    alike = np.array([row.pattern for row in rows if row.readings >= _LEAST_ROW] or [0.0])
+    chances = {
+        "rms": float(scipy.special.chdtrc(len(every), float(every @ every))),
+        "pattern": float(scipy.special.ndtr(-alike.sum() / np.sqrt(len(alike)))),
+        "sensor pattern": min(1.0, len(alike) * float(scipy.special.ndtr(-alike.max()))),
+    }
+    return Learnt(found, rows, chances)
 
 
-def contrasts(found: Posterior, places: Sequence[int]) -> tuple[Array, Array]:
-    """How far each of some unknowns stands out from the mean of the others, in sigma, and how
-    probable so much in any of them is if all are as the priors say; ``places`` are their numbers.
+def _alike(misfit: Array) -> float:
+    """The correlation r of n misfits with those before them, over its scatter.
 
-    Before the data the posterior mean m is N(0, 1 - C), so that a'm of a contrast a has the
-    variance a'(1 - C)a.  What all have in common (a warmer test) cancels.  Probabilities are
-    Bonferroni's.
+    Of independent normal ones r = sum e_i e_i+1 / sum e_i^2 has the mean 0, the variance
+    (n - 1) / (n (n + 2)), and lighter tails than a normal variable.
     """
-    count, chosen = len(places), np.array(places)
-    known = np.eye(len(found.mean)) - found.covariance
-    mean, known = found.mean[chosen], known[np.ix_(chosen, chosen)]
+    count, size = len(misfit), float(misfit @ misfit)
+    if count < _LEAST_ROW or not size:
+        return 0.0
+    scatter = np.sqrt((count - 1.0) / (count * (count + 2.0)))
+    return float(misfit[1:] @ misfit[:-1] / size / scatter)
+
+
+class Contrasts(NamedTuple):
+    """How unlike the others each place of an input is."""
+
+    sigma: Array
+    """Distance from the mean of the others, over its scatter before the data, shape (places,)."""
+    chance: Array
+    """Probability of so much in any place if all are as the priors say."""
+    group: list[int]
+    """0 for a place that does not stand out; else the number of the fault that it may have: the
+    data cannot tell apart places of one number."""
+
+
+def contrasts(mean: Array, covariance: Array, prior: Array, inputs: int = 1) -> Contrasts:
+    """Which of some places stands out, by the posterior's mean and covariance and the prior
+    covariance of their values in standard normal space, shapes (places,) and (places, places).
+
+    Before the data the posterior mean m is N(0, P - C), so that a'm of a contrast a has the
+    variance a'(P - C)a.  What all have in common (a warmer test) cancels.  After the farthest place
+    the others are judged by what it does not explain of them.  Probabilities are Bonferroni's, over
+    all places and so many ``inputs``.
+    """
+    count = len(mean)
     each = (count * np.eye(count) - 1.0) / (count - 1.0)
-    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", each, known, each), _LEAST_KNOWN))
-    out = each @ mean / spread
-    return out, np.minimum(1.0, 2.0 * count * scipy.special.ndtr(-np.abs(out)))
+    spread = each @ (prior - covariance) @ each.T
+    scatter = np.sqrt(np.maximum(np.diag(spread), _LEAST_KNOWN))
+    alike = spread / np.outer(scatter, scatter)
+    first = each @ mean / scatter
+    sigma, left, group = first.copy(), np.ones(count), [0] * count
+    for number in range(1, count):
+        free = [k for k in range(count) if not group[k] and left[k] > _LEAST_LEFT]
+        best = max(free, key=lambda k: abs(sigma[k]), default=None)
+        if best is None or _of_any(sigma[best], inputs * count) >= FALSE_ALARM:
+            break
+        least = np.sqrt(max(0.0, sigma[best] ** 2 - _AS_GOOD))
+        for k in free:
+            group[k] = number if abs(sigma[k]) >= least else 0
+        # Values of the others, given that of the best, over what is left of their scatter.
+        shared = alike[:, best] / np.sqrt(left[best])
+        rest = sigma * np.sqrt(left) - shared * sigma[best]
+        alike = alike - np.outer(shared, shared)
+        left = np.maximum(np.diag(alike), 0.0)
+        sigma = rest / np.sqrt(np.maximum(left, _LEAST_LEFT))
+    return Contrasts(first, np.array([_of_any(v, inputs * count) for v in first]), group)
+
+
+def _of_any(sigma: float, count: int) -> float:
+    return min(1.0, 2.0 * count * float(scipy.special.ndtr(-abs(sigma))))
 
 
 class Ranking(NamedTuple):
@@ -307,15 +368,16 @@ def calibration_tables(found: xr.Dataset) -> list[Table]:
         "the data say nothing",
         *_hardly(found),
         *_together(found),
+        *_beyond(found),
         *_standing_out(found),
     ]
     head = ("unknown", "unit", "prior", "median", "posterior", "remaining scatter")
     first = Table(head, rows, notes)
     sensors = [
-        (str(one["sensor"].item()), str(int(one["readings"])),
+        (str(one["sensor"].item()), str(int(one["readings"])) if one["readings"] else "none",
          str(int(one["strays"])) if one["strays"] else "-",
          number_text(float(one["rms_in_deviations"]), 3), chance_text(float(one["chance"])))
-        for k in np.argsort(-found["rms_in_deviations"].values, kind="stable")
+        for k in np.argsort(-found["rms_in_deviations"].fillna(-1.0).values, kind="stable")
         for one in [found.isel(sensor=int(k))]
     ]  # fmt: skip
     heads = ("sensor", "readings", "set aside", "rms / sigma", "by scatter alone")
@@ -323,15 +385,22 @@ def calibration_tables(found: xr.Dataset) -> list[Table]:
 
 
 def _hardly(found: xr.Dataset) -> list[str]:
-    names = found["unknown"].values[found["learnt"].values > _HARDLY]
-    return [f"hardly learnt from these sensors: {', '.join(names)}"] if len(names) else []
+    far = found["learnt"].values > _HARDLY
+    names = []
+    for name in dict.fromkeys(str(each) for each in found["input"].values):
+        own = found["input"].values == name
+        if (count := int((own & far).sum())) > 1:
+            names.append(f"{name} ({count} of {int(own.sum())} places)")
+        elif count:
+            names.append(str(found["unknown"].values[own & far][0]))
+    return [f"hardly learnt from these sensors: {', '.join(names)}"] if names else []
 
 
 def _together(found: xr.Dataset) -> list[str]:
     names, matrix = found["unknown"].values, found["correlation"].values
-    lines = []
+    hardly, lines = found["learnt"].values > _HARDLY, list[str]()
     for one, other in zip(*np.triu_indices(len(names), 1), strict=True):
-        if abs(r := matrix[one, other]) > _TOGETHER:
+        if abs(r := matrix[one, other]) > _TOGETHER and not (hardly[one] and hardly[other]):
             how = "difference" if r > 0.0 else "sum"
             lines.append(
                 f"{names[one]} and {names[other]}: the data tell their {how}, and each alone less "
@@ -340,24 +409,39 @@ def _together(found: xr.Dataset) -> list[str]:
     return lines
 
 
+def _beyond(found: xr.Dataset) -> list[str]:
+    """Unknowns whose prior hardly holds what was found."""
+    far = np.abs(found["shift"].values) > _FAR
+    return [
+        f"{name} lies {shift:+.1f} sigma from the median of its prior: widen the prior, if it is "
+        "no fault of this one place"
+        for name, shift in zip(
+            found["unknown"].values[far], found["shift"].values[far], strict=True
+        )
+    ]
+
+
 def _standing_out(found: xr.Dataset) -> list[str]:
     """Places of an input that are unlike its others, most probable ones first."""
+    if not _is_explained(found):
+        return []
     lines = []
     for name in dict.fromkeys(str(n) for n in found["input"].values):
         own = found.isel(unknown=np.flatnonzero(found["input"].values == name))
         if not np.isfinite(own["contrast"]).any():
             continue
-        order = np.argsort(-np.abs(own["contrast"].values), kind="stable")
-        far = [k for k in order if own["contrast_chance"].values[k] < FALSE_ALARM]
-        told = ", ".join(
-            f"{str(own['unknown'].values[k]).removeprefix(name)} ({own['contrast'].values[k]:+.1f} "
-            "sigma)" for k in far
-        )  # fmt: skip
+        sigma = own["contrast"].values
+        called = [str(each).removeprefix(name) for each in own["unknown"].values]
+        parts = []
+        for number in range(1, int(own["group"].max()) + 1):
+            same = sorted(np.flatnonzero(own["group"] == number), key=lambda k: -abs(sigma[k]))
+            told = ", ".join(f"{called[k]} ({sigma[k]:+.1f} sigma)" for k in same)
+            parts.append(told if len(same) == 1 else f"one of {told}: the data cannot tell which")
+        best = int(np.abs(sigma).argmax())
         lines.append(
-            f"{name}: " + (f"stands out from the other places: {told}" if far else
-                           f"no place stands out; the farthest is "
-                           f"{str(own['unknown'].values[order[0]]).removeprefix(name)} "
-                           f"({own['contrast'].values[order[0]]:+.1f} sigma)")
+            f"{name}: " + (f"stands out from the other places: {'; and '.join(parts)}" if parts else
+                           f"no place stands out; the farthest is {called[best]} "
+                           f"({sigma[best]:+.1f} sigma)")
             + f" (false alarms: at most {FALSE_ALARM:g} if all are as the prior says)"
         )  # fmt: skip
     return lines
@@ -367,6 +451,7 @@ def sensors_table(found: xr.Dataset) -> Table:
     """Sensors in the order in which they tell most (the dataset of ``ringsim sensors``)."""
     names = [str(name) for name in found["unknown"].values]
     listed = names if len(names) <= _LISTED else []
+    silent = str(found.attrs.get("silent", ""))
     after, alone = (np.exp(np.log(found[k].values).mean(axis=1)) for k in ("learnt", "alone"))
     rows = [
         (str(k + 1), str(sensor), number_text(alone[k], 2), number_text(after[k], 2),
@@ -379,26 +464,40 @@ def sensors_table(found: xr.Dataset) -> Table:
         "each next sensor is the one that leaves least; about the medians of the priors",
         *(f"hardly learnt even from all of them: {name}"
           for name, v in zip(names, found["learnt"].values[-1], strict=True) if v > _HARDLY),
+        *filter(None, [silent and f"tell nothing, since some run has no value at any of their "
+                       f"readings: {silent}"]),
     ]  # fmt: skip
     return Table(("", "sensor", "alone", "together", *listed), rows, notes)
 
 
+_WRONG = {
+    "rms": "the misfits of all sensors together are larger than scatter",
+    "pattern": "misfits of successive readings are alike in all sensors together",
+    "sensor pattern": "misfits of successive readings of a sensor are alike",
+}
+
+
 def _verdict(found: xr.Dataset) -> list[str]:
     """Whether the model explains the data, and what was left out."""
-    beyond, notes = found["chance"].values < UNEXPLAINED, list[str]()
-    if beyond.any() or float(found["chance_of_all"]) < UNEXPLAINED:
+    notes = list[str]()
+    if not _is_explained(found):
+        beyond = found["chance"].values * found.sizes["sensor"] < UNEXPLAINED
         names = ", ".join(found["sensor"].values[beyond])
-        alike = f"{float(found['pattern']):+.1f} sigma"
-        how = f"{names} differ by more than scatter" if names else (
-            f"all sensors together differ too much, or too evenly (successive misfits: {alike}),"
-        )  # fmt: skip
+        why = [f"{names} differ by more than scatter"] if names else []
+        why += [words for test, words in _WRONG.items()
+                if 3.0 * float(found["chance_of_all"].sel(test=test)) < UNEXPLAINED]  # fmt: skip
         notes.append(
-            f"NOT EXPLAINED: {how} from what any values of these unknowns give: the model lacks "
-            "something, numerical errors (solver.tolerance) count, or sigma is too small; the "
-            "intervals above are too narrow then"
+            f"NOT EXPLAINED: {'; '.join(why)}: no values of these unknowns near the posterior give "
+            "these readings. The model lacks something, numerical errors (solver.tolerance) count, "
+            "or sigma is too small; the intervals above are too narrow then"
         )
     else:
         notes.append("the posterior explains every sensor within the scatter of its readings")
+    if (widest := float(found["off"].max())) > 1.0:
+        notes.append(
+            f"runs of the last stage lie {widest:.2g} sigma off a linear map: use more stages, or "
+            "look whether two separate sets of values explain the readings"
+        )
     if strays := int(found["strays"].sum()):
         notes.append(
             f"set aside: {counted(strays, 'reading')} too far off for chance, alone among readings "
@@ -407,6 +506,11 @@ def _verdict(found: xr.Dataset) -> list[str]:
     lost, unused = int(found["lost"].sum()), int(found["unused"])
     if lost:
         notes.append(f"{counted(lost, 'run')} of {found.attrs['runs']} failed and told nothing")
+    silent = ", ".join(found["sensor"].values[found["readings"].values == 0])
+    if silent:
+        notes.append(
+            f"told nothing, since some run has no value at any of their readings: {silent}"
+        )
     if unused:
         notes.append(f"{counted(unused, 'reading')} left out, for which some run has no value")
     return notes

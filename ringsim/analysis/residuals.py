@@ -6,8 +6,9 @@ import numpy as np
 import xarray as xr
 
 from ringsim.measured import Measurement, Readings
-from ringsim.outputs.family import VARIABLES
+from ringsim.outputs.family import VARIABLES, axes, holds
 from ringsim.refusal import InputError, known_or_nearest, show
+from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, unit_text
 from ringsim.variables import GOALS
@@ -86,6 +87,26 @@ def _of(run: xr.Dataset, readings: Readings) -> Residuals:
     inside = (at >= times[0]) & (at <= times[-1]) if len(times) else np.zeros(len(at), dtype=bool)
     computed = np.interp(at[inside], times, values) if inside.any() else np.zeros(0)
     return Residuals(readings, at[inside], readings.values[inside], computed, int((~inside).sum()))
+
+
+def check_sensors(measurement: Measurement, scene: Scene) -> None:
+    """Refuse (InputError) sensors that no run of the scene has values for, and data without any."""
+    known, has, file = axes(scene), holds(scene), measurement.file
+    for sensor in file.sensors:
+        if absent := sorted(set(VARIABLES[sensor.variable].needs) - has):
+            raise InputError(
+                f"sensor {sensor.name}: runs of this scene do not have {sensor.variable}, because "
+                f"the scene has no {absent[0]}: leave the sensor out, or add that to the scene"
+            )
+        for dim, label in sensor.place.items():
+            labels = known[dim].tolist() if dim in known else [label]
+            if label not in labels:
+                hint = known_or_nearest(str(label), list(map(str, labels)))
+                raise InputError(
+                    f"sensor {sensor.name}: the scene has no {dim} {show(label)} ({hint})"
+                )
+    if not file.planned and not any(len(each.times) for each in measurement.readings):
+        raise InputError(f"{file.name}: no sensor has a reading: all cells are empty")
 
 
 def predictions(

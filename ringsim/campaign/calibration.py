@@ -20,10 +20,11 @@ from ringsim.analysis.posterior import (
     Learnt,
     Told,
     contrasts,
+    explained,
     learn,
     rank,
 )
-from ringsim.analysis.residuals import predictions
+from ringsim.analysis.residuals import check_sensors, predictions
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, listed_cases, require_no_launcher, start
@@ -33,7 +34,7 @@ from ringsim.measured import Measurement, load_measured
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
 from ringsim.sampling.columns import Table, add_inputs, correlate, pairs_of
 from ringsim.sampling.designs.independent import sobol_points
-from ringsim.sampling.distributions import Array, Calibrated, Distribution, Ranged, inside
+from ringsim.sampling.distributions import Array, Calibrated, Ranged, inside
 from ringsim.sampling.table import AnyDistribution
 from ringsim.scene import Scene
 from ringsim.units import Model
@@ -51,6 +52,8 @@ rope's first load made 0.1 N of 48 N with five records, and makes a twenty-fifth
 _MOST_RECORDS = 2000
 """Records of a run at most, which keeps a stage of 64 runs below half a gigabyte."""
 _LEVELS = (0.05, 0.5, 0.95)
+_ALL = 1.0 - 1e-9
+"""Largest correlation that a campaign takes."""
 _NAME = "ringsim.Calibration"
 """How refusals of arguments begin, as those of files with the file's name."""
 
@@ -105,12 +108,16 @@ def calibration_of(
         budget = Budget.model_validate(own)
     except ValidationError as error:
         raise InputError(explain(error, Budget, path.name)) from None
+    stages = "a calibration runs all its stages: leave it out"
+    checks = "leave it out, and run samples of the result by the full engine"
     for key, cure in {
         "design": "a calibration places its own samples: leave it out, and set runs and stages",
-        "check_every": "leave it out, and run samples of the result by the full engine",
-        "stop_when": "a calibration runs all its stages: leave it out",
+        "check_every": checks, "max_difference": checks, "error_bars_every": checks,
+        "stop_when": stages, "looks": stages,
+        "max_failed": "failed runs are counted and left out, whatever their number: leave it out",
+        "output": "stages store what calibrations need: leave it out",
         "requirements": "give them to a campaign that draws from the result: leave it out",
-    }.items():
+    }.items():  # fmt: skip
         if key in table:
             raise InputError(f"{path.name}: {key}: {cure}")
     table.setdefault("fidelity", "frame")
@@ -120,6 +127,7 @@ def calibration_of(
         raise InputError(f"{path.name}: inputs: there is nothing to find: give priors of unknowns")
     measurement = load_measured(path.parent / budget.measured, planned=True)
     found = Given(campaign, measurement, budget)
+    check_sensors(measurement, campaign.scene)
     unknowns = len(Unknowns.of(found).names)
     if found.members < (least := MEMBERS_AN_UNKNOWN * (unknowns + 1)):
         raise InputError(
@@ -135,9 +143,11 @@ class Axis:
 
     name: str
     """Path or name in a campaign file, with the place where there is one for each."""
-    law: Distribution
+    law: Ranged | Calibrated
     """Its prior."""
     units: str
+    group: str
+    """Of what it is one place: the key that it is drawn for, without a place."""
     input: str
     """The key that it is drawn for."""
     shared: tuple[str, ...] = ()
@@ -158,7 +168,7 @@ class Unknowns:
     def of(cls, given: Given) -> "Unknowns":
         """Those that a calibration asks for; InputError if one is no number of a range."""
         asked, file = given.campaign.specification, given.campaign.file.name
-        table, axes = given.campaign.draw(), dict[str, Axis]()
+        table, found = given.campaign.draw(), dict[str, Axis]()
         for column in table.columns:
             law = asked.inputs[column.input]
             if not isinstance(law, Ranged | Calibrated):
@@ -169,21 +179,28 @@ class Unknowns:
             bare = law.model_copy(update={"shared": (), "each_section": False})
             for mark in _marks(column.values, () if law.shared else column.places):
                 shared = tuple(f"{path}{mark}" for path in law.shared)
-                axes[f"{column.input}{mark}"] = Axis(
-                    f"{column.input}{mark}", bare, column.units, column.input, shared
+                # Of a posterior each place is an input of its own: together again here.
+                group = column.input.partition("[")[0]
+                found[f"{column.input}{mark}"] = Axis(
+                    f"{column.input}{mark}", bare, column.units, group, column.input, shared
                 )
         for name, units in {"offset": "s", "drift": "1"}.items():
             if (law := getattr(given.budget.clock, name)) is not None:
                 if given.measurement.file.clock is None:
                     raise InputError(f"{file}: clock.{name}: the measured data have no clock")
-                axes[f"clock.{name}"] = Axis(f"clock.{name}", law, units, f"clock.{name}")
-        matrix = np.eye(len(axes))
-        for pair, one, other in pairs_of(list(axes), asked.correlations):
+                if not isinstance(law, Ranged | Calibrated) or law.each_section or law.shared:
+                    raise InputError(
+                        f"{file}: clock.{name}: must be one number of a range: give it a "
+                        "continuous distribution, without each_section and shared"
+                    )
+                own = f"clock.{name}"
+                found[own] = Axis(own, law, units, own, own)
+        matrix = np.eye(len(found))
+        for pair, one, other in pairs_of(list(found), asked.correlations):
             matrix[one, other] = matrix[other, one] = pair.coefficient
-        correlate(np.full((1, len(axes)), 0.5), list(axes), asked.correlations)  # refuses others
-        return cls(
-            table, tuple(axes.values()), np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
-        )
+        correlate(np.full((1, len(found)), 0.5), list(found), asked.correlations)  # refuses others
+        lower = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+        return cls(table, tuple(found.values()), lower)
 
     @property
     def names(self) -> list[str]:
@@ -192,8 +209,8 @@ class Unknowns:
 
     def values(self, points: Array) -> dict[str, Array]:
         """Values by axis at points of standard normal space, shape (samples, unknowns)."""
-        shares = inside(scipy.special.ndtr(points @ self.lower.T))
-        return {a.name: a.law.quantile(shares[:, k]) for k, a in enumerate(self.axes)}
+        normal = points @ self.lower.T
+        return {a.name: a.law.of_normal(normal[:, k]) for k, a in enumerate(self.axes)}
 
     def at(self, points: Array) -> Table:
         """The inputs of the scene there."""
@@ -206,8 +223,8 @@ class Unknowns:
 
     def cases(self, points: Array) -> list[dict[str, float]]:
         """Values by scene path of each point, one value to a path."""
-        found = []
-        for sample, table in ((k, self.at(points)) for k in range(len(points))):
+        found, table = [], self.at(points)
+        for sample in range(len(points)):
             row = dict[str, float]()
             for column in table.columns:
                 each = np.atleast_1d(column.values[sample])
@@ -272,18 +289,21 @@ class _Course:
         self.points.append(points)
         stages = given.budget.stages
         name, title = f"stage-{number + 1}", f"stage {number + 1} of {stages}"
+        if not number:
+            # What an earlier call has found is not what this one finds.
+            (self.folder / (SENSORS if self.planning else POSTERIOR)).unlink(missing_ok=True)
         try:
             campaign = listed_cases(
                 self.folder, name,
                 given.campaign.scene.with_values({"record.interval": _interval(given)}),
                 unknowns.cases(points), title=f"{asked.title or asked.name}: {title}",
-                timeout=asked.limits.timeout, fidelity=asked.fidelity,
+                limits=asked.limits, fidelity=asked.fidelity,
             )  # fmt: skip
         except InputError as error:
-            raise InputError(
-                f"{given.campaign.file.name}: {title} is refused: {error} (where a value of the "
-                "scene is at fault: truncate the prior that gives it)"
-            ) from None
+            cure = "truncate the prior that gives it"
+            if str(self.folder) in str(error):
+                cure = f"choose another folder with --out, or delete {name} and later stages"
+            raise InputError(f"{given.campaign.file.name}: {title}: {error}: {cure}") from None
         last = number + 1 == stages
         return Order(campaign, self.folder / name, more=not last, brief=True)
 
@@ -322,10 +342,9 @@ class _Course:
             measured = self.nominal[k] if self.planning else readings.values
             there = np.isfinite(values).all(axis=0) & np.isfinite(measured)
             self.unused += int((~there).sum())
-            if there.any():
-                self.told.append(Told(readings.sensor.name, values[:, there], measured[there],
-                                      readings.deviation, readings.bias_deviation))  # fmt: skip
-        if not self.told:
+            self.told.append(Told(readings.sensor.name, values[:, there], measured[there],
+                                  readings.deviation, readings.bias_deviation))  # fmt: skip
+        if not any(len(each.measured) for each in self.told):
             raise InputError(
                 f"{name}: no reading lies within all runs: check clock.offset of the measured data "
                 "and solver.end_time of the scene"
@@ -379,16 +398,24 @@ def _write_posterior(course: _Course) -> None:
     correlation = covariance / np.outer(deviation, deviation)
     stream = np.random.default_rng([asked.seed, len(course.stages)])
     table = unknowns.at(last.posterior.draw(MEMBERS, stream))
-    laws = [
-        _moved(axis, m, s, given.measurement.file.name)
-        for axis, m, s in zip(unknowns.axes, mean.tolist(), deviation.tolist(), strict=True)
-    ]
     levels = np.array(_LEVELS)
     contrast, chance = np.full((2, len(names)), np.nan)
-    for name in dict.fromkeys(axis.input for axis in unknowns.axes):
-        own = [k for k, axis in enumerate(unknowns.axes) if axis.input == name]
-        if len(own) > 2:  # of two nobody can say which one is unlike the other
-            contrast[own], chance[own] = contrasts(last.posterior, own)
+    fault, groups = np.zeros(len(names), dtype=int), dict[str, list[int]]()
+    for k, axis in enumerate(unknowns.axes):
+        groups.setdefault(axis.group, []).append(k)
+    # Of two places nobody can say which one is unlike the other.
+    judged = [own for own in groups.values() if len(own) > 2]
+    prior = unknowns.lower @ unknowns.lower.T
+    for own in judged:
+        at = np.ix_(own, own)
+        apart = contrasts(mean[own], covariance[at], prior[at], len(judged))
+        contrast[own], chance[own], fault[own] = apart
+    well = explained([fit.chance for fit in last.fits], [*last.chances.values()])
+    test = given.measurement.file.name + " (NOT EXPLAINED: intervals too narrow)" * (not well)
+    laws = [
+        _moved(axis, m, s, test)
+        for axis, m, s in zip(unknowns.axes, mean.tolist(), deviation.tolist(), strict=True)
+    ]
     per_unknown, per_sensor, per_stage = ("unknown",), ("sensor",), ("stage",)
     numbers: dict[str, tuple[tuple[str, ...], Any, str]] = {
         "prior_quantile": (("unknown", "level"),
@@ -406,16 +433,18 @@ def _write_posterior(course: _Course) -> None:
                      "distance from the mean of the other places of the input, in sigma"),
         "contrast_chance": (per_unknown, chance, "probability of so large a contrast in any place "
                             "of the input if all are as the prior says"),
+        "group": (per_unknown, fault, "number of the fault that the place may have, 0 for none"),
         "rms_in_deviations": (per_sensor, [fit.rms for fit in last.fits],
                               "readings less what the posterior's mean gives, over their scatter"),
         "readings": (per_sensor, [fit.readings for fit in last.fits], "readings that were used"),
         "strays": (per_sensor, [fit.strays for fit in last.fits], "readings that were set aside"),
         "chance": (per_sensor, [fit.chance for fit in last.fits], "probability of so large an rms "
-                   "in any sensor by the scatter of the readings alone"),
-        "pattern": ((), last.pattern, "how alike successive misfits of a sensor are, N(0, 1) if "
-                    "nothing but scatter makes them"),
-        "chance_of_all": ((), last.chance, "probability of so large an rms of all readings, or of "
-                          "such a pattern, by the scatter of the readings alone"),
+                   "by the scatter of the readings alone"),
+        "pattern": (per_sensor, [fit.pattern for fit in last.fits], "how alike successive misfits "
+                    "are, N(0, 1) if nothing but scatter makes them"),
+        "off": (per_sensor, [fit.off for fit in last.fits], "how far runs lie off the linear map, "
+                "over the scatter of a reading"),
+        "chance_of_all": (("test",), [*last.chances.values()], "probability by scatter alone"),
         "stage_learnt": (("stage", "unknown"),
                          [np.sqrt(np.diag(unknowns.spread(s)[1])) for s in course.stages],
                          "learnt, after each stage"),
@@ -423,10 +452,12 @@ def _write_posterior(course: _Course) -> None:
         "unused": ((), course.unused, "readings that some run has no value for"),
     }  # fmt: skip
     words = {"unknown": names, "other": names, "sensor": sensors,
-             "input": [axis.input for axis in unknowns.axes],
+             "input": [axis.group for axis in unknowns.axes],
+             "test": [*last.chances],
              "unknown_units": [axis.units for axis in unknowns.axes]}  # fmt: skip
     own = [k for k, name in enumerate(names) if not name.startswith("clock.")]
-    pairs = [{"between": [names[i], names[j]], "coefficient": float(correlation[i, j])}
+    held = np.clip(correlation, -_ALL, _ALL)
+    pairs = [{"between": [names[i], names[j]], "coefficient": float(held[i, j])}
              for i in own for j in own if i < j]  # fmt: skip
     says = {names[k]: laws[k].model_dump(exclude_none=True) for k in own}
     attributes = {
@@ -441,7 +472,7 @@ def _write_posterior(course: _Course) -> None:
         file.setncatts(attributes)
         sizes = {"sample": MEMBERS, "unknown": len(names), "other": len(names),
                  "level": len(_LEVELS), "sensor": len(sensors),
-                 "stage": len(course.stages)}  # fmt: skip
+                 "stage": len(course.stages), "test": len(last.chances)}  # fmt: skip
         for name, size in sizes.items():
             file.createDimension(name, size)
         add_inputs(file, table, compression=4)
@@ -458,20 +489,22 @@ def _write_posterior(course: _Course) -> None:
 
 def _moved(axis: Axis, mean: float, deviation: float, test: str) -> Calibrated:
     """The prior of an axis moved and narrowed; of one that an earlier test has moved, by both."""
-    law, shift, scatter, before = axis.law, 0.0, 1.0, axis.law
+    before, shift, scatter = axis.law, 0.0, 1.0
     if isinstance(before, Calibrated):
-        law, shift, scatter = before.of, before.shift, before.remaining_scatter
-        test = f"{before.data}, {test}"
-    assert isinstance(law, Ranged)  # as Unknowns.of has seen
+        shift, scatter, test = before.shift, before.remaining_scatter, f"{before.data}, {test}"
     return Calibrated(
-        of=law, shift=shift + scatter * mean, remaining_scatter=scatter * deviation, data=test,
+        of=before.of if isinstance(before, Calibrated) else before,
+        shift=shift + scatter * mean, remaining_scatter=scatter * deviation, data=test,
         shared=axis.shared,
     )  # fmt: skip
 
 
 def _write_sensors(course: _Course) -> None:
     """The file of a plan of sensors, the one that tells most first."""
-    found, names = rank(course.points[-1], course.told), Unknowns.of(course.given).names
+    names = Unknowns.of(course.given).names
+    told = [each for each in course.told if len(each.measured)]
+    silent = [each.sensor for each in course.told if not len(each.measured)]
+    found = rank(course.points[-1], told)
     rows = xr.Dataset(
         {
             "learnt": (("sensor", "unknown"), found.after, {
@@ -480,8 +513,9 @@ def _write_sensors(course: _Course) -> None:
             "alone": (("sensor", "unknown"), found.alone[found.order], {
                 "long_name": "the same with this sensor alone", "units": "1"}),
         },
-        {"sensor": [course.told[k].sensor for k in found.order], "unknown": names},
-        {"scene": course.given.campaign.scene.to_toml(), **build.provenance()},
+        {"sensor": [told[k].sensor for k in found.order], "unknown": names},
+        {"scene": course.given.campaign.scene.to_toml(), "silent": ", ".join(silent),
+         **build.provenance()},
     )  # fmt: skip
     path = course.folder / SENSORS
     with writing(path), whole(path) as draft:

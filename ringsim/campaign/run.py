@@ -483,8 +483,9 @@ def run_cases(
     InputError if a case or the folder is refused, which changes no file; KeyboardInterrupt after a
     signal: call again.
     """
+    limits = Allowance(timeout=timeout)
     campaign = listed_cases(
-        folder, name, scene, cases, title=title, timeout=timeout, fidelity=fidelity
+        folder, name, scene, cases, title=title, limits=limits, fidelity=fidelity
     )
     choices = Choices(Local(workers), campaign.specification.limits, again=again, brief=True)
     if run_campaign(folder / name, choices) == EXIT_INTERRUPTED:
@@ -494,7 +495,7 @@ def run_cases(
 
 def listed_cases(
     folder: Path, name: str, scene: Scene, cases: Sequence[Mapping[str, Any]], *, title: str,
-    timeout: float, fidelity: str,
+    limits: Allowance, fidelity: str,
 ) -> Campaign:  # fmt: skip
     """The campaign of these cases, prepared in ``folder``/``name``; see :func:`run_cases`."""
     paths, listed = list(cases[0]), io.StringIO()
@@ -510,7 +511,8 @@ def listed_cases(
     base, rows, file = (f"{name}{end}" for end in ("-scene.toml", ".csv", ".toml"))
     table = {
         "name": name, "title": title, "scene": base, "fidelity": fidelity,
-        "design": {"kind": "list", "file": rows}, "limits": {"timeout": timeout},
+        "design": {"kind": "list", "file": rows},
+        "limits": limits.model_dump(exclude_defaults=True),
     }  # fmt: skip
     texts = {base: scene.to_toml(), rows: listed.getvalue(), file: tomli_w.dumps(table)}
     with writing(folder):

@@ -226,6 +226,11 @@ def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str]]:
         return "", []
     given = inputs["from"]
     given = {"file": given} if isinstance(given, str) else given
+    if not isinstance(given, dict):
+        raise InputError(
+            f"{path.name}: inputs.from = {show(given)} must be the name of a file, or a table "
+            'with file and without: write from = "posterior.nc"'
+        )
     try:
         source = Learnt.model_validate(given)
     except ValidationError as error:
@@ -236,7 +241,14 @@ def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str]]:
         raise InputError(f"{path.name}: {error}") from None
     own = flat({name: law for name, law in inputs.items() if name != "from"}, "kind")
     for key, names in (("inputs", own), ("set", flat(table.get("set") or {}))):
-        if twice := next((name for name in found if name in names), ""):
+        every = {name: law.get("shared") or [name] for name, law in found.items()}
+        twice = ""
+        for name, paths in every.items():
+            if any(p in names or first_inside(p, names) or any(first_inside(n, [p]) for n in names)
+                   for p in paths):  # fmt: skip
+                twice = name
+                break
+        if twice:
             raise InputError(
                 f"{path.name}: {twice} is given by {key} and by inputs.from, too: leave it out "
                 f"there, or here by without = [{show(twice)}]"

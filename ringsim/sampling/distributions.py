@@ -149,6 +149,15 @@ class Ranged(Distribution):
         """Cumulative probability of ``value``."""
         raise NotImplementedError
 
+    def of_normal(self, normal: Array) -> Values:
+        """Values at the same probabilities as those of a standard normal variable, same shape."""
+        return self.quantile(inside(scipy.special.ndtr(normal)))
+
+    def to_normal(self, values: Array) -> Array:
+        """The standard normal variable at the same probabilities as values, same shape."""
+        shares = np.array([self.probability(float(value)) for value in np.ravel(values)])
+        return np.asarray(scipy.special.ndtri(inside(shares)).reshape(np.shape(values)))
+
 
 class Continuous(Ranged):
     """A distribution over an interval of real numbers as it is."""
@@ -242,7 +251,15 @@ class Normal(Continuous):
 
     def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution."""
-        return np.asarray(self.mean + self.standard_deviation * scipy.special.ndtri(probability))
+        return self.of_normal(scipy.special.ndtri(probability))
+
+    def of_normal(self, normal: Array) -> Array:
+        """Also far out in the tails, where no probability tells values apart."""
+        return np.asarray(self.mean + self.standard_deviation * normal)
+
+    def to_normal(self, values: Array) -> Array:
+        """The same, backwards."""
+        return (np.asarray(values, dtype=float) - self.mean) / self.standard_deviation
 
     def log_density(self, values: Values) -> Array:
         """Logarithm of the density above."""
@@ -280,6 +297,16 @@ class Lognormal(Continuous):
     def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution."""
         return np.exp(self._logarithm.quantile(probability))
+
+    def of_normal(self, normal: Array) -> Array:
+        """Also far out in the tails, where no probability tells values apart."""
+        return np.exp(self._logarithm.of_normal(normal))
+
+    def to_normal(self, values: Array) -> Array:
+        """The same, backwards; -infinity for what is not above 0."""
+        known = np.asarray(values, dtype=float)
+        with np.errstate(divide="ignore"):
+            return self._logarithm.to_normal(np.log(np.maximum(known, 0.0)))
 
     def log_density(self, values: Values) -> Array:
         """That of ln x, less ln x."""
@@ -369,7 +396,7 @@ class Calibrated(Distribution):
     kind: Literal["calibrated"] = "calibrated"
     of: Annotated[Ranged, OneOf()]
     """Distribution before the data: the prior."""
-    shift: Annotated[float, Field(ge=-40.0, le=40.0)]
+    shift: Annotated[float, Field(ge=-1e6, le=1e6)]
     """Of the underlying standard normal variable: how many standard deviations it has moved."""
     remaining_scatter: Annotated[float, Field(gt=0.0, le=100.0)]
     """Of the same: what is left of the scatter, 1 where the data say nothing."""
@@ -384,22 +411,23 @@ class Calibrated(Distribution):
 
     def quantile(self, probability: Array) -> Values:
         """Inverse of the cumulative distribution."""
-        at = self.shift + self.remaining_scatter * scipy.special.ndtri(probability)
-        return self.of.quantile(inside(scipy.special.ndtr(at)))
+        return self.of_normal(scipy.special.ndtri(probability))
+
+    def of_normal(self, normal: Array) -> Values:
+        """Values where a standard normal variable is, same shape."""
+        return self.of.of_normal(self.shift + self.remaining_scatter * normal)
 
     def log_density(self, values: Values) -> Array:
         """That of ``of``, times the ratio of both normal densities at the value's place."""
-        shares = np.array([self.of.probability(float(v)) for v in np.ravel(values)])
-        at = scipy.special.ndtri(inside(shares)).reshape(np.shape(values))
+        at = self.of.to_normal(values)
         scaled = (at - self.shift) / self.remaining_scatter
         ratio = 0.5 * (at**2 - scaled**2) - math.log(self.remaining_scatter)
         return np.asarray(self.of.log_density(values) + ratio)
 
     def probability(self, value: float) -> float:
         """Cumulative probability of ``value``."""
-        share = float(inside(np.array(self.of.probability(value))))
-        at = (scipy.special.ndtri(share) - self.shift) / self.remaining_scatter
-        return float(scipy.special.ndtr(at))
+        at = self.of.to_normal(np.array(value))
+        return float(scipy.special.ndtr((at - self.shift) / self.remaining_scatter))
 
 
 class Uniform(Continuous):

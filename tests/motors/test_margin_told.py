@@ -148,5 +148,5 @@ def test_a_run_draws_what_resists_and_its_least_margin(
     angles, available = upper.lines[0].get_data()
     assert np.allclose(available, found.drive_available.dropna("time"))
     assert np.all(np.diff(angles) >= 0.0)
-    words = " ".join(text.get_text() for text in lower.texts)
+    words = lower.get_title() or lower.get_title(loc="left")
     assert f"least margin {float(found.least_drive_margin):.3f}" in words
