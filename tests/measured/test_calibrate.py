@@ -37,7 +37,7 @@ PRIORS = {
     "rods.poisson_ratio": {"kind": "lognormal", "mean": 0.3, "standard_deviation": 0.02},
 }  # fmt: skip
 TRUTH = {"cables.upper.winch.winding.speed": 0.127, "structure.opening_angle": 99.0}
-TIMES = np.arange(0.1, 1.42, 0.05)
+TIMES = np.arange(0.1, 1.42, 0.1)
 CLOCK = {"offset": 0.3, "drift": -0.02}
 """Of the stand: what the file does not say."""
 
@@ -55,7 +55,7 @@ def write_test(folder, values, *, clock=None, deviation=0.1, seed=1, planned=Fal
     columns = [(TIMES - clock["offset"]) / (1.0 + clock["drift"])]
     lines = ['name = "stand"']
     if planned:
-        lines += ["clock = { interval = 0.05, end = 1.4 }"]
+        lines += ["clock = { interval = 0.1, end = 1.4 }"]
     else:
         lines += ['file = "stand.csv"', 'clock = { column = "t" }']
     for plane, section in places:
@@ -197,6 +197,7 @@ MPIEXEC = shutil.which(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: ringsim[mpich]")
 def test_ranks_of_mpi_find_the_same(test_files, found, tmp_path):
     done = subprocess.run(
@@ -226,6 +227,7 @@ def test_clock_of_the_stand_is_found_too(tmp_path):
     assert posterior.attrs["inputs"].count("clock") == 0  # no campaign draws them
 
 
+@pytest.mark.slow
 def test_friction_that_the_model_does_not_know_is_told(tmp_path):
     write_test(tmp_path, TRUTH | {"cables.upper.friction.coefficient": 2e-3})
     file = write_file(tmp_path, inputs={k: v for k, v in PRIORS.items() if "poisson" not in k})
@@ -261,6 +263,7 @@ def test_campaign_draws_what_was_found(found, tmp_path):
     assert abs(wanted) > 0.3  # or the line above says nothing
 
 
+@pytest.mark.slow
 def test_second_test_begins_where_the_first_ended(found, tmp_path):
     """Twice the same readings are worth readings of half the variance."""
     posterior, folder = found
