@@ -12,6 +12,8 @@ readings d, so that
     C = (I + J' (I + S)^-1 J)^-1,    m = C J' (I + S)^-1 (d - b)
 
 are wide as long as the ensemble is too wide for a linear map, and the posterior once it is narrow.
+Readings are first reduced to the directions of J, of which there are no more than unknowns, so that
+few runs tell S; where it mixes these with others, a little of what the data tell is given away.
 The next ensemble is drawn from N(m, WIDER^2 C): no factors to choose, and nothing to tune.
 Source: Cleary, Garbuno-Inigo, Lan, Schneider and Stuart, J. Comput. Phys. 424 (2021) 109716,
 "Calibrate, emulate, sample", here with a linear emulator; for a linear model it is the closed form.
