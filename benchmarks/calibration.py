@@ -45,7 +45,7 @@ from ringsim.sampling.distributions import Lognormal, Normal, Uniform
 
 STAND = Path(__file__).parents[1] / "campaigns" / "stand"
 RING = {
-    "structure.sections": 6, "boom": "none", "solver.end_time": 12.0, "record.interval": 0.1,
+    "structure.sections": 6, "boom": "none", "solver.end_time": 12.0, "record.interval": 0.02,
 }  # fmt: skip
 PRIORS: dict[str, dict[str, Any]] = {
     "cables.upper.friction.coefficient":
@@ -84,15 +84,17 @@ def readings_of(scene: ringsim.Scene, stream: np.random.Generator, folder: Path)
     if run["status"]:
         raise ValueError(f"the truth fails: {run.attrs['reason']}")
     angle = run["opening_angle"]
-    # The run ends once all joints are locked, where they stay.
-    after = angle.max("time")
     sections = range(1, 7)
     names = [f"{plane}{section}" for plane in PLANES for section in sections]
     columns = []
     for name in names:
         place = {"plane": name[:5], "section": int(name[5:])}
         own = angle.sel(place).dropna("time")
-        exact = np.interp(TIMES, own["time"], own, right=float(after.sel(place)))
+        times, lock = own["time"].values, float(run["lock_time"].sel(place))
+        # The run ends once all joints have locked, and they stay where they are.
+        if lock > times[-1]:
+            times, own = np.append(times, lock), np.append(own, 180.0)
+        exact = np.interp(TIMES, times, own, right=180.0)
         columns.append(exact + 0.1 * stream.standard_normal(len(TIMES)))
     np.savetxt(folder / "stand.csv", np.column_stack([TIMES, *columns]), delimiter=",",
                header=",".join(["t", *names]), comments="", fmt="%.4f")  # fmt: skip
@@ -170,7 +172,7 @@ def flight(number: int, runs: int) -> dict[str, Any]:
     found: dict[str, Any] = {"number": number, "truth": truth}
     with tempfile.TemporaryDirectory() as place, contextlib.redirect_stderr(io.StringIO()):
         folder = Path(place)
-        readings_of(ground.with_values(values | {"record.interval": 0.02}), stream, folder)
+        readings_of(ground.with_values(values), stream, folder)
         ringsim.Calibration(
             ground, priors, folder / "stand.toml", runs=runs, seed=number, fidelity="frame"
         ).run(workers=0, out=folder / "cal")

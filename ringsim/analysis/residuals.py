@@ -11,7 +11,7 @@ from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, unit_text
-from ringsim.variables import GOALS
+from ringsim.variables import GOALS, Fate
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,8 @@ def predictions(
     variable's units; NaN where a run has no value.
 
     ``offset`` (s) and ``drift`` of the clock in each run, shape (samples,), take the place of the
-    measured file's.  Runs end once an antenna is deployed: its joints stay where they locked.
+    measured file's.  Runs end once an antenna is deployed: its joints stay at 180 deg.  What has
+    come to another goal stays as it was.
     """
     clock, samples = measurement.file.clock, campaign.sizes["sample"]
     known = (0.0, 0.0) if clock is None else (clock.offset, clock.drift)
@@ -126,7 +127,8 @@ def predictions(
     # From the time of the run by the file's clock to that by each run's own, t' = shift + scale t.
     scale = (1.0 + rates) / (1.0 + known[1])
     shift = starts - known[0] * scale
-    stays = np.isin(campaign["outcome"].to_numpy(), [int(goal) for goal in GOALS])
+    outcome = campaign["outcome"].to_numpy()
+    stays = np.isin(outcome, [int(goal) for goal in GOALS])
     found = []
     for readings in measurement.readings:
         values = _at_place(campaign, readings)
@@ -138,21 +140,34 @@ def predictions(
             found.append(each[:, None])
             continue
         times, rows = values["time"].to_numpy(), values.transpose("sample", "time").to_numpy()
-        holds = stays & (readings.sensor.variable == "opening_angle")
+        angle, locks = readings.sensor.variable == "opening_angle", np.full(samples, np.nan)
+        if angle and "lock_time" in campaign:
+            locks = campaign["lock_time"].sel(readings.sensor.place).to_numpy()
+            locks = np.where(outcome == int(Fate.DEPLOYED), locks, np.nan)
         found.append(np.array([
-            _at(shift[k] + scale[k] * readings.times, times, row, holds=bool(holds[k]))
+            _at(shift[k] + scale[k] * readings.times, times, row,
+                holds=bool(angle and stays[k]), lock=float(locks[k]))
             for k, row in enumerate(rows)
         ]))  # fmt: skip
     return found
 
 
-def _at(wanted: Array, times: Array, values: Array, *, holds: bool) -> Array:
-    """Values at other times, by lines; NaN before the first and after the last, unless it holds."""
+def _at(wanted: Array, times: Array, values: Array, *, holds: bool, lock: float) -> Array:
+    """Values at other times, by lines; NaN before the first and after the last, unless it holds.
+
+    A joint that locks (s; NaN without) is at 180 deg after the last record, which may be before its
+    lock or, on a springy stop, tenths of a degree off.
+    """
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(wanted), np.nan)
-    last = values[known][-1] if holds else np.nan
-    return np.interp(wanted, times[known], values[known], left=np.nan, right=last)
+    times, values = times[known], values[known]
+    last = values[-1] if holds else np.nan
+    if np.isfinite(lock):
+        last = 180.0
+        if lock > times[-1]:
+            times, values = np.append(times, lock), np.append(values, last)
+    return np.interp(wanted, times, values, left=np.nan, right=last)
 
 
 def residual_statistics(found: list[Residuals]) -> xr.Dataset:

@@ -10,7 +10,12 @@ import xarray as xr
 from click.testing import CliRunner
 from loops import for_each
 
-from ringsim.analysis.residuals import residual_statistics, residual_table, residuals
+from ringsim.analysis.residuals import (
+    predictions,
+    residual_statistics,
+    residual_table,
+    residuals,
+)
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.measured import load_measured
@@ -52,14 +57,16 @@ standard_deviation = 0.1
 """
 
 
+OPENING = load_scene("truss2").with_values({
+    "structure.opening_angle": 120.0, "record.interval": 0.05,
+    "cables.upper.winch.winding.speed": 0.1, "cables.lower.winch.winding.speed": 0.1,
+})  # fmt: skip
+"""Two sections that open within 4 s."""
+
+
 @pytest.fixture(scope="module")
 def run() -> xr.Dataset:
-    """Two sections that open within 4 s."""
-    scene = load_scene("truss2").with_values({
-        "structure.opening_angle": 120.0, "record.interval": 0.05,
-        "cables.upper.winch.winding.speed": 0.1, "cables.lower.winch.winding.speed": 0.1,
-    })  # fmt: skip
-    return simulate(scene, "frame")
+    return simulate(OPENING, "frame")
 
 
 def table(run: xr.Dataset, *, noise: bool = True) -> list[list[str]]:
@@ -270,3 +277,23 @@ def test_netcdf_holds_the_same_readings(tmp_path: Path) -> None:
         (tmp_path / "other.toml").write_text(toml.replace("stand.nc", name))
         with pytest.raises(InputError, match=words):
             load_measured(tmp_path / "other.toml")
+
+
+def test_joints_come_to_180_deg_at_their_lock_and_stay_there(tmp_path: Path) -> None:
+    coarse, fine = (
+        simulate(OPENING.with_values({"record.interval": interval}), "frame")
+        for interval in (0.09, 0.005)
+    )
+    at_joint = {"plane": "upper", "section": 1}
+    lock = float(coarse["lock_time"].sel(at_joint))
+    last = float(coarse["opening_angle"].sel(at_joint).dropna("time")["time"][-1])
+    assert last < lock < last + 0.09
+    # Before the lock, angles of the finer records are the truth.
+    known = fine["opening_angle"].sel(at_joint).dropna("time")
+    before, after = np.linspace(last, lock - 0.005, 5), [lock, lock + 0.01, lock + 3.0]
+    rows = [["t", "enc"], *([f"{1e3 * (t - 0.5) / 1.001:.12g}", "3"] for t in [*before, *after])]
+    encoder = ENCODER.replace("section = 2", "section = 1")
+    measurement = load_measured(written(tmp_path, HEAD + encoder, rows))
+    [angles] = predictions(coarse.expand_dims("sample"), measurement)
+    np.testing.assert_allclose(angles[0, :5], known.interp(time=before), atol=0.02)
+    np.testing.assert_allclose(angles[0, 5:], 180.0, atol=1e-9)
