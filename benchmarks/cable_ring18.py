@@ -66,18 +66,18 @@ class Clock:
 
 def timed(scene: Scene, *, dense: bool) -> tuple[float, float, Recorder]:
     """Processor time per second of motion, share of the cable's Python part, and the run."""
-    force, jacobian = Clock(CableDrive._force), Clock(CableDrive._jacobian)
+    force, jacobian = Clock(CableDrive.force), Clock(CableDrive.jacobian)
     if dense:
         jacobian = Clock(DenseDrive.jacobian)
-    kept = CableDrive._force, CableDrive._jacobian
-    CableDrive._force = lambda *v: force(*v)  # type: ignore[method-assign, assignment]
-    CableDrive._jacobian = lambda *v: jacobian(*v)  # type: ignore[method-assign, assignment]
+    kept = CableDrive.force, CableDrive.jacobian
+    CableDrive.force = lambda *v: force(*v)  # type: ignore[method-assign, assignment]
+    CableDrive.jacobian = lambda *v: jacobian(*v)  # type: ignore[method-assign, assignment]
     try:
         start = time.process_time()
         history = Integration(build(scene)).run()
         spent = time.process_time() - start
     finally:
-        CableDrive._force, CableDrive._jacobian = kept  # type: ignore[method-assign]
+        CableDrive.force, CableDrive.jacobian = kept  # type: ignore[method-assign]
     return spent / history.times[-1], (force.spent + jacobian.spent) * 1e-9 / spent, history
 
 

@@ -6,7 +6,7 @@ Run: python benchmarks/frame_cost.py ratio [SCENE ...]     both engines in turn,
      python benchmarks/frame_cost.py energy [SCENE ...]     energy errors of both at nine tolerances
      python benchmarks/frame_cost.py energy SCENE:SECONDS   of its beginning, at 33
 
-Every run has a process of its own, which compiles and loads before the clock starts.  Times are
+Every run has a process of its own, which loads the core before the clock starts.  Times are
 processor time with one thread; what is compared holds all outputs and energies.  Errors are against
 the frame engine with steps a quarter as long.  One run's energy error is partly chance, that of
 where steps meet an impact: "energy" repeats runs at tolerances around the scene's own.

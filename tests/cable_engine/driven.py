@@ -37,7 +37,7 @@ def truss(sections: int = 2, **values: Any) -> Scene:
 def outcome(scene: Scene, engine: str = "full") -> Outcome:
     """Run a scene; the checks that hold of every run are made here."""
     found = {"full": run, "frame": run_frame}[engine](scene)
-    # Frames have no joints that could gape but for a stiff spring at each: see docs/frame.md.
+    # Frames have no joints that could gape but for a stiff spring at each (docs/theory/frame.md).
     assert found.values["constraint_error"] < {"full": 1e-9, "frame": 1e-8}[engine]
     return found
 
