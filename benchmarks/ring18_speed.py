@@ -21,7 +21,7 @@ import ringsim, time
 ringsim.simulate
 scene = ringsim.load_scene("ring18").with_values({values})
 begun = time.process_time()
-found = ringsim.simulate(scene)
+found = ringsim.simulate(scene, fidelity="full")
 print(float(found["deployment_time"]), time.process_time() - begun, int(found["steps"]))
 """
 PLAIN = """

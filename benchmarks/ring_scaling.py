@@ -36,7 +36,7 @@ def main(counts: list[int]) -> None:
     before: tuple[int, float] | None = None
     for sections in counts:
         begun = time.process_time()
-        found = simulate(scene_of(sections))
+        found = simulate(scene_of(sections), fidelity="full")
         taken, steps = time.process_time() - begun, int(found["steps"])
         if int(found["status"]) != 0:
             raise RuntimeError(str(found.attrs["reason"]))
