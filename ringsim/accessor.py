@@ -107,9 +107,9 @@ class Ring:
         return drawn if name is None else drawn[name]
 
     def residuals(self, measured: str | Path) -> xr.Dataset:
-        """Measured data less this run by ``sensor``, of the TOML file that describes them, as
-        ``ringsim compare RUN FILE`` lists them: in the units of each variable, and over the
-        standard deviation of a reading.
+        """Measured data less this run, or the median of these samples, by ``sensor``, of the TOML
+        file that describes them, as ``ringsim compare RUN FILE`` lists them: in the units of each
+        variable, and over the standard deviation of a reading.
 
         InputError if the file is refused, or the run lacks what a sensor measures.
         """

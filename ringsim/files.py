@@ -21,6 +21,17 @@ DRAFT = ".draft"
 """How names of files end that are still being written; nobody reads them."""
 
 
+def campaign_cure(folder: Path) -> str:
+    """What to give in place of a folder without a campaign: where it has some inside, one of these,
+    such as a calibration's stages.
+    """
+    inside = sorted(file.parent.name for file in folder.glob(f"*/{DESIGN}"))
+    if not inside:
+        return "give the folder that ringsim campaign has written"
+    others = f" .. {inside[-1]}" if len(inside) > 1 else ""
+    return f"give a campaign inside it, such as {folder / inside[0]}{others}"
+
+
 _LONGEST_TEXT = 50_000_000
 """Letters: a scene of 1,000 sections with a value for each has a hundredth of it; /dev/zero would
 fill the memory.

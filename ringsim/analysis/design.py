@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ringsim.analysis import intervals
 from ringsim.analysis.intervals import NONE, NOTHING, Interval, good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
-from ringsim.files import DESIGN, MERGED
+from ringsim.files import DESIGN, MERGED, campaign_cure
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import BLOCK_ROW
@@ -542,7 +542,7 @@ def open_stored(path: Path) -> xr.Dataset:
         file = path / MERGED
         if not file.exists():
             inside = (path / DESIGN).exists()
-            cure = "there is no campaign in it: give the folder that ringsim campaign has written"
+            cure = f"there is no campaign in it: {campaign_cure(path)}"
             if inside and any(path.glob("journals/*")):
                 cure = f"its results are not merged yet: run ringsim merge {path} first"
             elif inside:

@@ -1,5 +1,6 @@
-"""What a run says beside measured data: differences by sensor, in units and in scatter."""
+"""What runs say beside measured data: differences by sensor, in units and in scatter."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, unit_text
-from ringsim.variables import GOALS, Fate
+from ringsim.variables import GOALS, Fate, Status
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,13 @@ class Residuals:
     computed: Array
     """The same of the run."""
     outside: int
-    """Readings before the first or after the last value of the run, or of what it never came to."""
+    """Readings before the first or after the last value of the run, or of what it never came to; of
+    half of a campaign's samples or more."""
+    band: Array | None = None
+    """Of a campaign: ends of what holds 90 % of the samples' readings, scatter included, shape
+    (2, n); ``computed`` is the samples' median then."""
+    beyond: int = 0
+    """Readings that lie farther off than scatter may put them from every sample of a campaign."""
 
     @property
     def apart(self) -> Array:
@@ -38,21 +45,60 @@ class Residuals:
         """The same over the standard deviation of a reading."""
         return self.apart / self.readings.deviation
 
+    @property
+    def within(self) -> Array:
+        """1 for readings within the band, 0 for others; NaN without a band."""
+        if self.band is None:
+            return np.full(len(self.measured), np.nan)
+        low, high = self.band
+        return np.asarray((self.measured >= low) & (self.measured <= high), dtype=np.float64)
+
 
 def residuals(run: xr.Dataset, measurement: Measurement) -> list[Residuals]:
-    """Of every sensor of a test; values of the run between its records are linear.
+    """Of every sensor of a test beside a run or a campaign; values between records are linear.
 
-    Raises
-    ------
-    InputError
-        If the run has not the variable or the place of a sensor, or is a campaign.
+    InputError if a run has not the variable or the place of a sensor.
     """
-    if "sample" in run.dims:
-        raise InputError(
-            "measured data are compared with a run, and this is a campaign: give the run of one "
-            "sample (ringsim replay DIR SAMPLE --save FILE)"
-        )
-    return [_of(run, readings) for readings in measurement.readings]
+    if "sample" not in run.dims:
+        return [_of(run, readings) for readings in measurement.readings]
+    good = run.isel(sample=np.flatnonzero(run["status"].to_numpy() == Status.OK))
+    if not good.sizes["sample"]:
+        raise InputError("no sample of the campaign has ended well: nothing to compare with")
+    every = predictions(good, measurement)
+    return [
+        _of_samples(readings, values)
+        for readings, values in zip(measurement.readings, every, strict=True)
+    ]
+
+
+_TAIL = 0.05
+"""Share of samples on each side of a band."""
+_WIDE = 1.6449
+"""Sigmas of a reading on each side that hold as much."""
+_FAR = 3.5
+"""Sigmas of a reading beyond every sample from which on scatter is not to blame: once in 4,000
+readings even at the last sample."""
+
+
+def _of_samples(readings: Readings, values: Array) -> Residuals:
+    """Of values of each sample, shape (samples, readings)."""
+    there = np.isfinite(values).mean(axis=0) > 0.5
+    known, measured = values[:, there], readings.values[there]
+    if not there.any():
+        nothing = np.zeros(0)
+        return Residuals(readings, nothing, nothing, nothing, len(there), np.zeros((2, 0)))
+    low, middle, high = np.nanquantile(known, [_TAIL, 0.5, 1.0 - _TAIL], axis=0)
+    # A sensor's own bias moves all its readings, and so each of them.
+    sigma = math.hypot(readings.deviation, readings.bias_deviation)
+    band = np.array([
+        middle - np.hypot(middle - low, _WIDE * sigma),
+        middle + np.hypot(high - middle, _WIDE * sigma),
+    ])  # fmt: skip
+    past = np.maximum(np.nanmin(known, axis=0) - measured, measured - np.nanmax(known, axis=0))
+    return Residuals(
+        readings, readings.times[there], measured, middle, int((~there).sum()), band,
+        int((past > _FAR * sigma).sum()),
+    )  # fmt: skip
 
 
 def _at_place(run: xr.Dataset, readings: Readings) -> xr.DataArray:
@@ -173,7 +219,9 @@ def _at(wanted: Array, times: Array, values: Array, *, holds: bool, lock: float)
 def residual_statistics(found: list[Residuals]) -> xr.Dataset:
     """Statistics by ``sensor``: readings that are compared, and that lie outside of the run; mean,
     root mean square and largest of measured less computed, in the variable's units, and when the
-    largest is; the root mean square over the standard deviation of a reading.
+    largest is; the root mean square over the standard deviation of a reading.  Beside a campaign
+    the median of its samples is what is computed, and there are two more: the share of readings
+    within the band of 90 %, and how many lie beyond every sample.
     """
     names = [each.readings.sensor.name for each in found]
     rows = {
@@ -186,6 +234,9 @@ def residual_statistics(found: list[Residuals]) -> xr.Dataset:
         "rms_in_deviations": [_rms(each.in_deviations) for each in found],
         "variable_units": [VARIABLES[each.readings.sensor.variable].units for each in found],
     }
+    if any(each.band is not None for each in found):
+        rows["within_band"] = [_mean(each.within) for each in found]
+        rows["beyond_samples"] = [each.beyond for each in found]
     every = np.concatenate([np.zeros(0), *(each.in_deviations for each in found)])
     return xr.Dataset(
         {name: ("sensor", np.array(row)) for name, row in rows.items()},
@@ -211,6 +262,7 @@ def _farthest(each: Residuals) -> tuple[float, float]:
 def residual_table(found: list[Residuals]) -> Table:
     """The statistics as a table, the sensor that fits worst first."""
     told, rows = residual_statistics(found), []
+    sampled = "within_band" in told
     sizes = np.nan_to_num(told["rms_in_deviations"].values, nan=-1.0)
     for k in np.argsort(-sizes, kind="stable").tolist():
         one = told.isel(sensor=k)
@@ -227,12 +279,16 @@ def residual_table(found: list[Residuals]) -> Table:
               for n in ("mean_difference", "rms_difference", "largest_difference")),
             number_text(float(one["largest_difference_time"]), 4),
             number_text(factor * readings.deviation, 2),
-            number_text(float(one["rms_in_deviations"]), 3),
+            *((number_text(float(one["within_band"]), 2), str(int(one["beyond_samples"]) or "-"))
+              if sampled else (number_text(float(one["rms_in_deviations"]), 3),)),
         ))  # fmt: skip
     head = (
         "sensor", "unit", "readings", "outside the run", "empty cells", "gaps",
-        "mean difference", "rms difference", "largest difference", "at (s)", "sigma", "rms / sigma",
+        "mean difference", "rms difference", "largest difference", "at (s)", "sigma",
+        *(("within 90 %", "beyond all samples") if sampled else ("rms / sigma",)),
     )  # fmt: skip
+    if sampled:
+        return Table(head, rows, _of_campaign(told))
     notes = [
         "difference: measured less computed; rms / sigma is 1 where nothing but the scatter of "
         "the readings sets them apart, and more where the model or its values do",
@@ -240,3 +296,21 @@ def residual_table(found: list[Residuals]) -> Table:
         f"{counted(told.attrs['compared'], 'reading')}",
     ]
     return Table(head, rows, notes)
+
+
+def _of_campaign(told: xr.Dataset) -> list[str]:
+    compared = told["compared"].values
+    weights = compared if compared.any() else np.ones(len(compared))
+    share = float(np.average(told["within_band"].fillna(0.0), weights=weights))
+    notes = [
+        "difference: measured less the median of the samples; within 90 %: share of the readings "
+        "in the band that holds 90 % of the samples, with the scatter of a reading",
+        f"all sensors: {number_text(share, 2)} of {counted(int(compared.sum()), 'reading')} lie in "
+        "it; far less than 0.9 says that the inputs scatter too little, or about wrong values",
+    ]
+    if beyond := int(told["beyond_samples"].sum()):
+        notes.append(
+            f"beyond all samples by more than {_FAR:g} sigma: {counted(beyond, 'reading')}, which "
+            "no values give that were drawn of the inputs"
+        )
+    return notes

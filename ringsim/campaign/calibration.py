@@ -98,11 +98,14 @@ def calibration_of(
     text: str, path: Path, settings: Mapping[str, Any] | None = None, scene: Scene | None = None
 ) -> Given:
     """The calibration that a text describes: a campaign file without a design, with ``measured``
-    and a budget.  ``path``, ``settings`` and ``scene`` are as in ``campaign_of``.
+    and a budget.  ``path``, ``settings`` (which may also have runs and stages) and ``scene`` are as
+    in ``campaign_of``.
 
     InputError if it, the data or a prior is refused.
     """
-    table = parse_toml(text, path.name)
+    table, settings = parse_toml(text, path.name), dict(settings or {})
+    # --set reaches the scene's values, and how much is run.
+    table |= {name: settings.pop(name) for name in ("runs", "stages") if name in settings}
     own = {name: table.pop(name) for name in Budget.model_fields if name in table}
     try:
         budget = Budget.model_validate(own)

@@ -151,15 +151,22 @@ def _save(found: xr.Dataset, out: Path | None) -> None:
     "--analysis", metavar="FILE", type=PATH,
     help="Show the analysis in this file (from ringsim analyse --out) instead of a new one.",
 )  # fmt: skip
+@click.option(
+    "--measured", metavar="TOML", type=PATH,
+    help="Lay the measured data of this file beside the samples, too.",
+)  # fmt: skip
 @click.option("--pdf", is_flag=True, help="Also write a PDF of the same name (needs chromium).")
-def report_command(folder: Path, out: Path, analysis: Path | None, pdf: bool) -> None:
+def report_command(
+    folder: Path, out: Path, analysis: Path | None, measured: Path | None, pdf: bool
+) -> None:
     """Write one page about the campaign in DIR, or in a file campaign.nc.
 
     The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
     """
     _require_page("--out", out, pdf=pdf)
     with opened(folder) as campaign:
-        size = _write(campaign, folder / MERGED if folder.is_dir() else folder, out, analysis)
+        file = folder / MERGED if folder.is_dir() else folder
+        size = _write(campaign, file, out, analysis, measured)
     _told_page(out, size, pdf=pdf)
 
 
@@ -187,7 +194,10 @@ def _told_page(out: Path, size: int, *, pdf: bool) -> None:
         click.echo(f"wrote {out.with_suffix('.pdf')}")
 
 
-def _write(campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None) -> int:
+def _write(
+    campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None, measured: Path | None
+) -> int:
+    from ringsim.measured import load_measured
     from ringsim.report.page import write_report
 
     if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
@@ -200,7 +210,8 @@ def _write(campaign: xr.Dataset, file: Path, out: Path, analysis: Path | None) -
             f"--analysis {analysis}: has no analysis: give a file of ringsim analyse --out, or "
             "leave it out"
         )
-    return write_report(campaign, out, str(file.parent), known)
+    test = None if measured is None else load_measured(measured)
+    return write_report(campaign, out, str(file.parent), known, test)
 
 
 def _load(file: Path) -> xr.Dataset:
@@ -226,7 +237,7 @@ def _load(file: Path) -> xr.Dataset:
     "--measured",
     metavar="TOML",
     type=PATH,
-    help="Draw the measured data of this file over the run, and nothing else.",
+    help="Draw the measured data of this file over the run or the samples, and nothing else.",
 )
 @click.option("--out", metavar="DIR", type=PATH, help="Folder for the figures (default: FILE's).")
 def plot_command(
@@ -316,8 +327,8 @@ def _require_sample(dataset: xr.Dataset, sample: int, file: Path) -> None:
 def compare_command(
     first: Path, second: Path, page: Path | None, out: Path | None, *, pdf: bool
 ) -> None:
-    """Compare SECOND with FIRST: two campaigns (folders or files), two runs, or a run with measured
-    data (a TOML file).
+    """Compare SECOND with FIRST: two campaigns (folders or files), two runs, or a run or campaign
+    with measured data (a TOML file).
 
     Samples with equal seeds or inputs are compared in pairs, which shows much smaller differences.
     """
@@ -328,7 +339,7 @@ def compare_command(
         if page is not None:
             raise InputError(
                 "--report: a page compares two results: leave it out, and draw measured data with "
-                f"ringsim plot {first} --measured {second}"
+                f"ringsim plot {first} --measured {second}, or ringsim report --measured"
             )
         _compare_measured(first, second, out)
         return

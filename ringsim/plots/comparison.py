@@ -1,4 +1,4 @@
-"""Figures of two campaigns, or two runs, beside each other, and of a run beside measured data."""
+"""Figures of two campaigns, or runs, beside each other, and of either beside measured data."""
 
 import textwrap
 from collections.abc import Iterator
@@ -306,7 +306,9 @@ def measured_and_computed(found: list[Residuals], title: str) -> Figure:
     """A row a sensor: readings over the run's curve on the left, and on the right the readings less
     the curve in standard deviations of a reading, with a band of two.
 
-    Numbers without a time are left out, and so are sensors beyond twelve: those that fit best.
+    Beside a campaign the curve is the samples' median, and both bands hold 90 % of the samples with
+    the scatter of a reading.  Numbers without a time are left out, and so are sensors beyond
+    twelve: those that fit best.
     """
     over_time = [each for each in found if len(each.times) and np.isfinite(each.times).all()]
     shown = sorted(over_time, key=lambda each: -np.mean(each.in_deviations**2))[:_MOST_SENSORS]
@@ -314,17 +316,24 @@ def measured_and_computed(found: list[Residuals], title: str) -> Figure:
     rows = figure.subplots(max(1, len(shown)), 2, sharex=True, squeeze=False)
     for (left, right), each in zip(rows, shown, strict=False):
         variable = VARIABLES[each.readings.sensor.variable]
-        left.plot(each.times, each.measured, ".", color=style.VERMILLION, markersize=3.0,
+        left.plot(each.times, each.measured, ".", color=style.VERMILLION, markersize=3.0, zorder=3,
                   label="measured", rasterized=len(each.times) > 2000)  # fmt: skip
-        left.plot(each.times, each.computed, color=style.BLUE, linewidth=1.3, label="computed")
+        words, band = "computed", np.broadcast_to([[-2.0], [2.0]], (2, len(each.times)))
+        if each.band is not None:
+            words, band = "median of samples", (each.band - each.computed) / each.readings.deviation
+            left.fill_between(each.times, *each.band, color=style.SKY, alpha=0.35, linewidth=0.0,
+                              label="90 % of samples")  # fmt: skip
+        left.plot(each.times, each.computed, color=style.BLUE, linewidth=1.3, label=words)
         left.set_title(each.readings.sensor.name, fontsize=9.5)
         left.set_ylabel(unit_behind("", variable.units).strip(" ()"), fontsize=9)
-        right.axhspan(-2.0, 2.0, color=style.SKY, alpha=0.35, linewidth=0.0)
+        right.fill_between(each.times, *band, color=style.SKY, alpha=0.35, linewidth=0.0)
         right.axhline(0.0, color=style.GREY, linewidth=0.9)
         right.plot(each.times, each.in_deviations, ".", color=style.INK, markersize=2.5,
                    rasterized=len(each.times) > 2000)  # fmt: skip
-        rms = float(np.sqrt(np.mean(each.in_deviations**2)))
-        right.set_title(f"rms {rms:.3g} sigma", fontsize=9.5)
+        fits = f"rms {float(np.sqrt(np.mean(each.in_deviations**2))):.3g} sigma"
+        if each.band is not None:
+            fits = f"{each.within.mean():.0%} of readings in the band"
+        right.set_title(fits, fontsize=9.5)
         right.set_ylabel("sigma", fontsize=9)
     for axes in rows[-1]:
         axes.set_xlabel("Time (s)")

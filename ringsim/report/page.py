@@ -20,12 +20,14 @@ from ringsim.analysis.design import (
     paths_of,
 )
 from ringsim.analysis.intervals import good
+from ringsim.analysis.residuals import residual_table, residuals
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import head_lines, outputs_in, sections
+from ringsim.analysis.study_text import Section, head_lines, outputs_in, sections
 from ringsim.analysis.worst import note_on_unusual, worst_tables
 from ringsim.files import write_text
+from ringsim.measured import Measurement
 from ringsim.overrides import flat
-from ringsim.plots.comparison import figures_of_both
+from ringsim.plots.comparison import figures_of_both, measured_and_computed
 from ringsim.plots.figures import figures_of
 from ringsim.refusal import show
 from ringsim.report import tables
@@ -109,23 +111,28 @@ _FIRST = 3
 
 
 def write_report(
-    campaign: xr.Dataset, out: Path, folder: str, analysis: xr.Dataset | None = None
-) -> int:
+    campaign: xr.Dataset, out: Path, folder: str, analysis: xr.Dataset | None = None,
+    measurement: Measurement | None = None,
+) -> int:  # fmt: skip
     """Write the page of a merged campaign, which is in memory; returns its size in bytes.
 
     ``folder`` is what readers of the page give to ``ringsim replay``.  InputError if the file
-    cannot be written.
+    cannot be written, or the campaign has not what was measured.
     """
-    text = page(campaign, folder, analysis)
+    text = page(campaign, folder, analysis, measurement)
     write_text(out, text)
     return len(text.encode("utf-8"))
 
 
-def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) -> str:
+def page(
+    campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None,
+    measurement: Measurement | None = None,
+) -> str:  # fmt: skip
     """The page as text: nothing in it refers to another file or address.
 
     All statistics are those of ``analysis``, what ``analyse`` gives, by default of today.  Figures
     are drawn as lines as long as the page stays below ``LARGEST`` with them, then as pictures.
+    A ``measurement`` is laid beside the samples.
     """
     analysis = analyse(campaign) if analysis is None else analysis
     wanted = campaign_file(campaign)
@@ -165,7 +172,17 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "provenance": list(tables.provenance(campaign)),
     }  # fmt: skip
     figures = [(p.name, p.words, f) for p, f in drawn if matters or p.name != _MATTERS]
-    return written("page.html.j2", context, figures, beside=_MATTERS)
+    if measurement is not None:
+        apart = residuals(campaign, measurement)
+        told["measured"] = Section("measured", "Measured data", [residual_table(apart)])
+        title = measurement.file.title or measurement.file.name
+        figures.append((
+            "measured", "Measured data beside the samples: on the left readings, the samples' "
+            "median and the band of 90 % of them with the scatter of a reading; on the right both "
+            "less the median, in standard deviations of a reading",
+            measured_and_computed(apart, title),
+        ))  # fmt: skip
+    return written("page.html.j2", context, figures, beside=(_MATTERS, "measured"))
 
 
 def _turn(name: str) -> int:

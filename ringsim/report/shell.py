@@ -4,7 +4,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,12 +26,12 @@ LARGEST = 2_000_000
 
 def written(
     template: str, context: Mapping[str, Any], drawn: Sequence[tuple[str, str, "Figure"]],
-    beside: str = "",
+    beside: Collection[str] = (),
 ) -> str:  # fmt: skip
     """The page of a template: ``figures`` in it are name, words and element of each one drawn.
 
-    The one named ``beside`` is not among these, but ``mattering``.  They are lines as long as the
-    page stays below ``LARGEST`` with them, then pictures.
+    Those named ``beside`` are not among these, but by their names in ``beside``.  They are lines as
+    long as the page stays below ``LARGEST`` with them, then pictures.
     """
     shell = jinja2.Environment(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
@@ -48,9 +48,9 @@ def written(
     return text
 
 
-def _apart(figures: list[tuple[str, str, str]], name: str) -> dict[str, Any]:
-    own = [each for each in figures if each[0] == name]
-    return {"figures": [each for each in figures if each not in own], "mattering": own}
+def _apart(figures: list[tuple[str, str, str]], names: Collection[str]) -> dict[str, Any]:
+    own = {each[0]: each for each in figures if each[0] in names}
+    return {"figures": [each for each in figures if each[0] not in own], "beside": own}
 
 
 def _sentence(line: str) -> str:

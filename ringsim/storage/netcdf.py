@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim import build
-from ringsim.files import DESIGN, whole, writing
+from ringsim.files import DESIGN, campaign_cure, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
 from ringsim.refusal import InputError, known_or_nearest
@@ -148,7 +148,7 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
         what = "this is a file" if folder.exists() else "there is no such folder"
         if folder.is_dir():
             what = f"no campaign in this folder: it has no {DESIGN}"
-        raise InputError(f"{folder}: {what}: give the folder that ringsim campaign has written")
+        raise InputError(f"{folder}: {what}: {campaign_cure(folder)}")
     try:
         with netCDF4.Dataset(path) as file:
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}

@@ -142,6 +142,18 @@ def test_stages_are_campaigns_of_their_own(found):
     done = CliRunner().invoke(cli, ["status", str(folder / "stage-2")])
     assert done.exit_code == 0
     assert "16 of 16" in done.output
+    for verb in ("status", "analyse"):
+        done = CliRunner().invoke(cli, [verb, str(folder)])
+        assert done.exit_code == 2
+        assert f"give a campaign inside it, such as {folder / 'stage-1'} .. stage-3" in done.output
+
+
+def test_budget_can_be_set_in_the_call(test_files):
+    given = calibration_of(
+        test_files.read_text(), test_files, {"runs": 60, "stages": 2, "solver.step": 0.02}
+    )
+    assert (given.budget.runs, given.budget.stages, given.members) == (60, 2, 30)
+    assert given.campaign.scene.solver.step == 0.02
 
 
 def test_what_is_printed_is_what_the_file_holds(test_files, found):

@@ -16,12 +16,16 @@ from ringsim.analysis.residuals import (
     residual_table,
     residuals,
 )
+from ringsim.campaign.python import Campaign
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.measured import load_measured
+from ringsim.plots import figures
 from ringsim.refusal import InputError
+from ringsim.sampling.distributions import Uniform
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
+from ringsim.variables import Fate
 
 pytestmark = pytest.mark.quick
 
@@ -226,8 +230,9 @@ def test_sensors_that_the_run_lacks_are_told(run: xr.Dataset, tmp_path: Path) ->
     ):  # fmt: skip
         with pytest.raises(InputError, match=words.replace("?", r"\?")):
             residuals(run, load_measured(written(tmp_path, HEAD + toml, rows)))
-    with pytest.raises(InputError, match="ringsim replay DIR SAMPLE --save"):
-        residuals(run.expand_dims("sample"), load_measured(written(tmp_path, HEAD + CELL, rows)))
+    none = even_campaign().isel(sample=[0])  # the one that failed
+    with pytest.raises(InputError, match="no sample of the campaign has ended well"):
+        residuals(none, load_measured(written(tmp_path, HEAD + ENCODER, rows)))
 
 
 def test_commands_compare_and_draw(run: xr.Dataset, tmp_path: Path) -> None:
@@ -297,3 +302,90 @@ def test_joints_come_to_180_deg_at_their_lock_and_stay_there(tmp_path: Path) -> 
     [angles] = predictions(coarse.expand_dims("sample"), measurement)
     np.testing.assert_allclose(angles[0, :5], known.interp(time=before), atol=0.02)
     np.testing.assert_allclose(angles[0, 5:], 180.0, atol=1e-9)
+
+
+SLOPES = np.linspace(9.0, 11.0, 201)
+"""deg/s, of samples whose joints open evenly from 90 deg."""
+
+
+def even_campaign() -> xr.Dataset:
+    times = np.linspace(0.0, 2.0, 201)
+    angles = (90.0 + SLOPES[:, None] * times)[:, None, None, :]
+    failed = np.full_like(angles[:1], 33.0)
+    dims = ("sample", "plane", "section", "time")
+    samples = len(SLOPES) + 1
+    return xr.Dataset(
+        {
+            "opening_angle": (dims, np.concatenate([failed, angles])),
+            "status": ("sample", np.arange(samples) == 0),
+            "outcome": ("sample", np.full(samples, int(Fate.NONE))),
+        },
+        {"time": times, "plane": ["upper"], "section": [2], "sample": np.arange(samples)},
+    )
+
+
+def even_readings(folder: Path, angles: np.ndarray, at: np.ndarray) -> Path:
+    rows = [f"{t:.6f},{a:.9f}" for t, a in zip(at, angles, strict=True)]
+    text = ENCODER.replace('"rad"', '"deg"').replace("0.002", "0.05").replace("0.01", "0.0")
+    head = 'name = "stand-1"\nfile = "stand.csv"\nclock = { column = "t" }\n'
+    return written(folder, head + text, [["t", "enc"], *([row] for row in rows)])
+
+
+def test_samples_of_a_campaign_lie_beside_readings(tmp_path: Path) -> None:
+    at = np.linspace(0.1, 1.9, 19)
+    file = even_readings(tmp_path, 90.0 + 10.6 * at, at)
+    [found] = residuals(even_campaign(), load_measured(file))
+    assert found.band is not None
+    np.testing.assert_allclose(found.computed, 90.0 + 10.0 * at)
+    # Slopes are even: 90 % of them within 0.9 deg/s of 10, beside the scatter of a reading.
+    half = np.hypot(0.9 * at, 1.6449 * 0.05)
+    np.testing.assert_allclose(found.band, found.computed + np.array([-half, half]), atol=1e-9)
+    assert found.within.all()
+    assert found.beyond == 0
+    far = even_readings(tmp_path, 90.0 + 11.5 * at, at)
+    [found] = residuals(even_campaign(), load_measured(far))
+    assert found.beyond == int((0.5 * at > 3.5 * 0.05).sum())
+    assert found.within.sum() == int((1.5 * at < half).sum())
+    told = residual_statistics([found])
+    assert told["within_band"].item() == pytest.approx(found.within.mean())
+    notes = " ".join(residual_table([found]).notes)
+    assert f"by more than 3.5 sigma: {found.beyond} readings" in notes
+    assert f"{found.within.mean():.2g} of 19 readings lie in it" in notes
+
+
+def test_band_holds_nine_tenths_of_tests_that_the_inputs_foretell(tmp_path: Path) -> None:
+    rng, at, held = np.random.default_rng(3), np.linspace(0.05, 1.95, 20), []
+    for _ in range(25):
+        truth = 90.0 + rng.uniform(9.0, 11.0) * at
+        file = even_readings(tmp_path, truth + 0.05 * rng.normal(size=len(at)), at)
+        [found] = residuals(even_campaign(), load_measured(file))
+        held.append(found.within.mean())
+    # Readings of a test go together: the scatter is that between tests.
+    assert abs(np.mean(held) - 0.9) < 3.0 * np.std(held) / np.sqrt(len(held)) + 0.02
+
+
+def test_page_of_a_campaign_shows_the_test_beside_its_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = [each for each in figures.PICTURES if each.name == "distributions"]
+    monkeypatch.setattr(figures, "PICTURES", few)
+    folder = tmp_path / "six"
+    campaign = Campaign(
+        OPENING, {"cables.upper.winch.winding.speed": Uniform(low=0.08, high=0.12)},
+        {"kind": "random", "samples": 6}, 1, fidelity="frame",
+    ).run(workers=0, out=folder)  # fmt: skip
+    at = np.array([0.3, 0.6, 0.9])
+    curves = campaign["opening_angle"].sel(plane="upper", section=2)
+    file = even_readings(tmp_path, curves.median("sample").interp(time=at).values, at)
+    shell = CliRunner()
+    page = tmp_path / "six.html"
+    done = shell.invoke(cli, ["report", str(folder), "--measured", str(file), "--out", str(page)])
+    assert done.exit_code == 0, done.output
+    text = page.read_text()
+    assert 'id="figure-measured"' in text
+    assert "All sensors: 1 of 3 readings" in text
+    told = shell.invoke(cli, ["compare", str(folder), str(file)])
+    assert "all sensors: 1 of 3 readings lie in it" in told.output
+    drawn = shell.invoke(cli, ["plot", str(folder), "--measured", str(file), "--out", str(folder)])
+    assert drawn.exit_code == 0, drawn.output
+    assert (folder / "campaign-fig-measured.png").stat().st_size > 10_000
