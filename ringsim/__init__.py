@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ringsim.analysis.comparison import compare
     from ringsim.analysis.study import analyse
     from ringsim.campaign.calibration import Calibration
+    from ringsim.campaign.optimisation import Optimisation
     from ringsim.campaign.python import Campaign, CampaignError, open_campaign
     from ringsim.measured import load_measured
     from ringsim.refusal import InputError
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from ringsim.stored_state import read_state
 
 __all__ = [
-    "Calibration", "Campaign", "CampaignError", "InputError", "Scene", "analyse", "compare",
-    "load_measured", "load_scene", "open_campaign", "read_state", "simulate",
+    "Calibration", "Campaign", "CampaignError", "InputError", "Optimisation", "Scene", "analyse",
+    "compare", "load_measured", "load_scene", "open_campaign", "read_state", "simulate",
 ]  # fmt: skip
 
 _HOMES = {
@@ -36,10 +37,12 @@ _HOMES = {
     "Calibration": "campaign.calibration", "Campaign": "campaign.python",
     "CampaignError": "campaign.python",
     "open_campaign": "campaign.python", "InputError": "refusal",
-    "load_measured": "measured", "Scene": "scene", "load_scene": "scene", "simulate": "simulation",
-    "read_state": "stored_state",
+    "Optimisation": "campaign.optimisation", "load_measured": "measured", "Scene": "scene",
+    "load_scene": "scene", "simulate": "simulation", "read_state": "stored_state",
 }  # fmt: skip
-_OF_DATASETS = ("analyse", "compare", "Calibration", "Campaign", "open_campaign", "simulate")
+_OF_DATASETS = (
+    "analyse", "compare", "Calibration", "Campaign", "Optimisation", "open_campaign", "simulate",
+)  # fmt: skip
 """Words that give datasets, or take them."""
 
 

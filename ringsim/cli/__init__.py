@@ -34,6 +34,7 @@ VERBS = {
     "replay": "Run one sample of a campaign again.",
     "calibrate": "Find unknown inputs from measured data.",
     "sensors": "Tell before a test how much each sensor would tell.",
+    "optimise": "Find the values that make an antenna best under what is uncertain.",
     "stability": "Map which settings the solver can run, and how other runs end.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",
 }
@@ -41,7 +42,7 @@ VERBS = {
 _FILES = {
     "scene": ("scenes", "check", "explain"),
     "run": ("run",),
-    "studies": ("accuracy", "stability", "calibrate", "sensors"),
+    "studies": ("accuracy", "stability", "calibrate", "sensors", "optimise"),
     "campaign": ("campaign", "status", "replay"),
     "results": ("merge", "analyse", "report", "plot", "compare", "export"),
 }

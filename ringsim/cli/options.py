@@ -104,11 +104,14 @@ def write_animation(run: "xr.Dataset", file: Path, colour: str | None) -> None:
     click.echo(f"wrote {animate(run, file, colour or 'lag')}")
 
 
-def draw_learnt(dataset: "xr.Dataset", folder: Path, stem: str, formats: Formats = None) -> None:
-    """Write the figure of a posterior, as the verbs calibrate and plot do."""
+def draw_result(dataset: "xr.Dataset", folder: Path, stem: str, formats: Formats = None) -> None:
+    """Write the figure of a posterior or of a front, as their verbs and plot do."""
     from ringsim.plots import figures
     from ringsim.plots.comparison import learnt
+    from ringsim.plots.studies import front
 
-    drawn = figures.write_figure(learnt(dataset), folder, f"{stem}-fig-learnt", formats or ("png",))
-    for written in drawn:
+    name, draw = ("learnt", learnt) if "learnt" in dataset else ("front", front)
+    for written in figures.write_figure(
+        draw(dataset), folder, f"{stem}-fig-{name}", formats or ("png",)
+    ):
         click.echo(f"wrote {written}")

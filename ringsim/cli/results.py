@@ -20,7 +20,7 @@ from ringsim.cli.options import (
     PLOT_FORMAT,
     Formats,
     draw_figures,
-    draw_learnt,
+    draw_result,
     listed,
     require_with,
     write_animation,
@@ -246,15 +246,15 @@ def plot_command(
 ) -> None:  # fmt: skip
     """Draw the figures of a run, or of a campaign, from its FILE.
 
-    FILE is what ringsim run, replay --save, campaign, merge or calibrate has written.
+    FILE is what ringsim run, replay --save, campaign, merge, calibrate or optimise has written.
     """
     require_with("--colour", colour, "--animate", animate)
     require_with("--sample", sample, "--animate", animate)
     from ringsim.plots.figures import left_out
 
     with opened(file) as dataset:
-        if "learnt" in dataset and "posterior_quantile" in dataset:
-            draw_learnt(dataset, out or file.parent, file.stem, formats)
+        if {"learnt", "posterior_quantile"} <= set(dataset) or "tried_objective" in dataset:
+            draw_result(dataset, out or file.parent, file.stem, formats)
             return
         file = file / MERGED if file.is_dir() else file
         campaign = "sample" in dataset.dims

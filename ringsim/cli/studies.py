@@ -9,7 +9,7 @@ import click
 import tomli_w
 
 from ringsim.campaign.panels import Panel, by_engines, panels_over
-from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS, draw_learnt
+from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS, draw_result
 from ringsim.execution.mpi import launched_size
 from ringsim.files import read_text, write_text
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED
@@ -203,6 +203,52 @@ def sensors_command(
     return _course(file, settings, out, workers, lambda d: [sensors_table(d)], planning=True)
 
 
+@click.command()
+@click.argument("file", metavar="FILE", type=PATH)
+@SETTINGS
+@click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME).")
+@_WORKERS
+@click.option("--plot", is_flag=True, help="Draw the front beside front.nc.")
+def optimise_command(
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None, *, plot: bool
+) -> int:
+    """Find the values that make an antenna best under what is uncertain.
+
+    FILE is a campaign file without a design, with variables, objectives and constraints.  Writes
+    front.nc, a scene file for each design on the front, and its campaign of fresh samples; designs
+    that were tried are campaigns in the same folder.  The same command goes on with one that was
+    interrupted; under mpiexec or srun every rank computes, and --workers is left out.
+    """
+    import xarray as xr
+
+    from ringsim.analysis.optimum import front_tables
+    from ringsim.campaign.optimisation import optimisation_of, run_optimisation
+
+    ended, path = run_optimisation(
+        lambda: optimisation_of(read_text(file), file, settings), _most(workers), out
+    )
+    if ended.refused is not None:
+        if ended.first:
+            raise ended.refused
+        return EXIT_BAD_INPUT
+    if ended.first and ended.code == EXIT_DONE:
+        found = xr.load_dataset(path)
+        for table in front_tables(found):
+            for line in ["", *table.lines()]:
+                click.echo(line)
+        click.echo(f"wrote {path}")
+        if plot:
+            draw_result(found, path.parent, path.stem)
+    return ended.code
+
+
+def _most(workers: int | None) -> int | None:
+    """Solver processes: those that are asked for, or one for each core; under an MPI launcher each
+    rank has one.
+    """
+    return workers or (len(os.sched_getaffinity(0)) if launched_size() == 1 else None)
+
+
 def _course(
     file: Path, settings: dict[str, Any], out: Path | None, workers: int | None,
     tables: Callable[[Any], list[Table]], *, planning: bool, plot: bool = False,
@@ -211,10 +257,11 @@ def _course(
 
     from ringsim.campaign.calibration import calibration_of, run_course
 
-    # Under an MPI launcher each rank has one.
-    most = workers or (len(os.sched_getaffinity(0)) if launched_size() == 1 else None)
     ended, path = run_course(
-        lambda: calibration_of(read_text(file), file, settings), most, out, planning=planning
+        lambda: calibration_of(read_text(file), file, settings),
+        _most(workers),
+        out,
+        planning=planning,
     )
     if ended.refused is not None:
         if ended.first:
@@ -227,5 +274,5 @@ def _course(
                 click.echo(line)
         click.echo(f"wrote {path}")
         if plot:
-            draw_learnt(found, path.parent, path.stem)
+            draw_result(found, path.parent, path.stem)
     return ended.code

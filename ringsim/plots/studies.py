@@ -1,4 +1,4 @@
-"""Figures of accuracy and stability studies."""
+"""Figures of accuracy and stability studies, and of optimisations."""
 
 import textwrap
 from typing import Any
@@ -14,6 +14,7 @@ from matplotlib.ticker import LogLocator
 from ringsim.analysis.engines import OUTPUTS
 from ringsim.analysis.stability import AGREE, ENGINES, OK, WRONG, axis_label
 from ringsim.plots import style
+from ringsim.tables import unit_behind
 
 # Error against cost: the work-precision figure of an accuracy study.
 
@@ -197,3 +198,68 @@ def _short(value: float) -> str:
         return f"{value:.4g}"
     digits, power = f"{value:.1e}".split("e")
     return f"{digits.removesuffix('.0')}e{int(power)}"
+
+
+# The front of an optimisation.
+
+
+@style.styled
+def front(found: xr.Dataset) -> Figure:
+    """On the left what designs reach: those that were tried by few samples (blue where nothing that
+    is required is broken), and the present and the chosen ones by fresh samples with their
+    intervals; over the second objective, or over the order in which they were tried.  On the right
+    where the variables of the chosen designs lie between their bounds.
+    """
+    variables, two = found.sizes["variable"], found.sizes["objective"] == 2
+    figure = Figure(figsize=(12.0, max(4.2, 0.5 * variables + 1.8)))
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+    units = [str(u) for u in found["objective_units"].values]
+    kept = (found["tried_lost"].values == 0.0) & (found["tried_beyond"].values <= 0.0).all(axis=1)
+    tried = found["tried_objective"].values
+    order = np.arange(1, len(tried) + 1)
+    across = tried[:, 1] if two else order
+    left.scatter(across[~kept], tried[~kept, 0], s=14, facecolors="none", edgecolors=style.GREY,
+                 label="tried, breaks a constraint")  # fmt: skip
+    left.scatter(across[kept], tried[kept, 0], s=14, color=style.SKY, label="tried")
+    middle, low, high = (found[f"objective_{end}"].values for end in ("value", "lower", "upper"))
+    names = [str(name) for name in found["design"].values]
+    for k, name in enumerate(names):
+        colour = style.INK if k == 0 else style.VERMILLION
+        x = middle[k, 1] if two else len(tried) + 2 + 2 * k
+        ends = np.abs(np.array([[low[k, 0]], [high[k, 0]]]) - middle[k, 0])
+        wide = np.abs(np.array([[low[k, 1]], [high[k, 1]]]) - middle[k, 1]) if two else None
+        left.errorbar(x, middle[k, 0], yerr=ends, xerr=wide, fmt="s" if k == 0 else "D",
+                      color=colour, markersize=5, capsize=3)  # fmt: skip
+        left.annotate(name, (x, middle[k, 0]), textcoords="offset points", xytext=(6, 5),
+                      fontsize=8.5, color=colour)  # fmt: skip
+    objectives = [str(name) for name in found["objective"].values]
+    left.set_ylabel(unit_behind(objectives[0], units[0]))
+    left.set_xlabel(unit_behind(objectives[1], units[1]) if two else "Design, as tried")
+    left.margins(x=0.1, y=0.1)
+    left.legend(loc="best", fontsize=8)
+    left.set_title("Tried (few samples), present and chosen (fresh samples, 95 %)", fontsize=10)
+    lowest, highest = found["low"].values, found["high"].values
+    for k in range(variables):
+        right.plot([0.0, 1.0], [k, k], color=style.GREY, linewidth=0.9)
+        for j in range(len(names)):
+            value = float(found["value"].values[j, k])
+            place = (value - lowest[k]) / (highest[k] - lowest[k])
+            right.plot(place, k, "s" if j == 0 else "D", markersize=5,
+                       color=style.INK if j == 0 else style.VERMILLION)  # fmt: skip
+            if len(names) < _MANY:
+                right.annotate(f"{value:.4g}", (place, k), textcoords="offset points",
+                               xytext=(0, 6 if j else -13), fontsize=8, ha="center")  # fmt: skip
+    known = zip(found["variable"].values, found["variable_units"].values, strict=True)
+    labels = [unit_behind(str(name), str(unit)) for name, unit in known]
+    right.set_yticks(range(variables), labels)
+    right.tick_params(axis="y", labelsize=8.5, length=0)
+    right.set_ylim(variables - 0.4, -0.7)
+    right.set_xlim(-0.06, 1.06)
+    right.set_xticks([0.0, 1.0], ["low", "high"])
+    right.set_title("Variables: present (black) and chosen", fontsize=10)
+    style.title(figure, f"Designs: {found.attrs['title'] or found.attrs['name']}")
+    return figure
+
+
+_MANY = 4
+"""Designs from which on their values are not written at the marks."""

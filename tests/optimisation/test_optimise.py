@@ -1,0 +1,188 @@
+"""Optimisations from file to front: small rings, kills, workers, and refusals."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+import ringsim
+from ringsim.campaign.optimisation import FRONT, optimisation_of
+from ringsim.cli import cli
+from ringsim.refusal import InputError
+from ringsim.scene import load_scene
+from ringsim.simulation import simulate
+
+FILE = """
+name = "quick"
+title = "Three sections, fast enough"
+seed = 4
+scene = "ring18-cable"
+fidelity = "frame"
+designs = 18
+samples = 6
+check = 16
+verdict = 24
+
+[set]
+"structure.sections" = 3
+"structure.opening_angle" = 100.0
+boom = "none"
+"solver.end_time" = 3.0
+
+[variables.speed]
+low = 0.08
+high = 0.2
+shared = ["cables.upper.winch.winding.speed", "cables.lower.winch.winding.speed"]
+
+[objectives]
+peak_tension = { minimise = "mean" }
+
+[constraints]
+deployment_time = { max = 2.5, probability = 0.9, confidence = 0.9 }
+
+[inputs.friction]
+kind = "lognormal"
+mean = 6e-4
+standard_deviation = 1e-4
+shared = ["cables.upper.friction.coefficient", "cables.lower.friction.coefficient"]
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("file") / "quick.toml"
+    path.write_text(FILE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(file):
+    """The front, in this process."""
+    out = file.parent / "out"
+    return ringsim.Optimisation.read(file).run(workers=0, out=out), out
+
+
+def own_scene(speed, friction):
+    table = tomllib.loads(FILE)
+    both = [f"cables.{plane}" for plane in ("upper", "lower")]
+    return load_scene(table["scene"]).with_values(
+        table["set"] | {f"{each}.winch.winding.speed": speed for each in both}
+        | {f"{each}.friction.coefficient": friction for each in both}
+    )  # fmt: skip
+
+
+def test_slowest_speed_that_is_fast_enough_is_found(found):
+    """The tension falls with the speed and the time rises: the best speed is at the bound on time,
+    which hardly depends on friction, and which bisection finds."""
+    front, _ = found
+    assert front["design"].values.tolist() == ["present", "design-1"]
+    low, high = 0.08, 0.2
+    while high - low > 1e-4:
+        middle = 0.5 * (low + high)
+        time_ = float(simulate(own_scene(middle, 6e-4), "frame")["deployment_time"])
+        low, high = (low, middle) if time_ <= 2.5 else (middle, high)
+    assert float(front["value"].sel(design="design-1")[0]) == pytest.approx(high, rel=0.02)
+    assert front["verdict"].sel(design="design-1").item() == 2
+    assert float(front["value"].sel(design="present")[0]) == 0.12
+
+
+def test_numbers_of_the_front_are_those_of_its_campaigns(found):
+    front, out = found
+    for name in front["design"].values:
+        campaign = ringsim.open_campaign(out / str(name))
+        one = front.sel(design=name)
+        assert campaign.sizes["sample"] == 24
+        opened = campaign.where(campaign["outcome"] == 1)  # others have not done what they should
+        assert int(one["short"]) == 24 - int((campaign["outcome"] == 1).sum())
+        mean = float(opened["peak_tension"].mean())
+        np.testing.assert_allclose(one["objective_value"][0], mean)
+        kept = float((campaign["deployment_time"] <= 2.5).mean())
+        assert float(one["probability"][0]) == pytest.approx(kept)
+        speed = float(one["value"][0])
+        scene = ringsim.load_scene(out / f"{name}.toml") if name != "present" else None
+        if scene is not None:
+            assert scene.cables.lower.winch.winding.speed == speed
+    assert front["short"].values.tolist() == [24, 0]  # at 0.12 m/s nothing opens within 3 s
+    second = ringsim.open_campaign(out / "designs" / "002-search")
+    mean = float(second["peak_tension"].mean())
+    np.testing.assert_allclose(front["tried_objective"][1, 0], mean)
+    seeds = [ringsim.open_campaign(out / name)["sample_seed"].values.tolist()
+             for name in ("designs/001-search", "present")]  # fmt: skip
+    assert not set(seeds[0]) & set(seeds[1])
+    # All designs have the same samples.
+    assert second["sample_seed"].values.tolist() == seeds[0]
+
+
+def test_command_prints_what_the_file_holds_and_draws_it(found, file, monkeypatch):
+    front, out = found
+    done = CliRunner().invoke(cli, ["optimise", str(file), "--out", str(out), "--plot"])
+    assert done.exit_code == 0, done.output
+    assert (out / "front-fig-front.png").stat().st_size > 20_000
+    lines = done.output.splitlines()
+    row = next(line for line in lines if line.startswith("peak_tension (mean) (N)"))
+    told = float(row.split()[-1])
+    np.testing.assert_allclose(told, front["objective_value"].values[1, 0], rtol=1e-3)
+    assert any(line.split()[:1] == ["verdict"] and "met" in line for line in lines)
+    again = xr.load_dataset(out / FRONT)
+    xr.testing.assert_identical(again, front)
+
+
+def test_killed_and_finished_by_other_workers_it_is_the_same(found, file, tmp_path):
+    front, _ = found
+    out = tmp_path / "killed"
+    command = [sys.executable, "-m", "ringsim", "optimise", str(file), "--workers", "2", "--out",
+               str(out)]  # fmt: skip
+    process = subprocess.Popen(command, start_new_session=True, stdout=subprocess.PIPE,
+                               stderr=subprocess.STDOUT)  # fmt: skip
+    end = time.monotonic() + 120.0
+    while not (out / "designs" / "004-search").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    assert not (out / FRONT).exists()
+    again = ringsim.Optimisation.read(file).run(workers=1, out=out)
+    xr.testing.assert_equal(again, front)
+
+
+REFUSED = [
+    (('low = 0.08', 'low = 0.3'), "variables.speed.low = 0.3 must be below high = 0.2"),
+    (('high = 0.2', 'high = 0.1'), "the scene has 0.12, where the search begins, and 0.08 .. 0.1"),
+    (("upper.winch.winding.speed", "upper.winch.winding.sped"), "winding.sped"),
+    (("cables.upper.winch.winding.speed", "structure.sections"), "structure.sections"),
+    (('["cables.upper.friction.coefficient", ', '["cables.upper.winch.winding.speed", '), "drawn"),
+    (("designs = 18", "designs = 5"), "too few for 1 variables: set designs = 8 at least"),
+    (("verdict = 24", "verdict = 20"), "set verdict = 22 at least"),
+    (("peak_tension", "peak_tensio"), "did you mean peak_tension"),
+    (("peak_tension", "cable_tension"), "peak_tension"),
+    (('minimise = "mean"', 'minimise = "quantile"'), "probability goes with a quantile"),
+    (('minimise = "mean"', 'maximise = "mean", minimise = "mean"'), "needs either"),
+    (("designs = 18", "designs = 18\nfront = 3"), "one objective has one best design"),
+    (("designs = 18", 'designs = 18\ndesign = { kind = "random", samples = 3 }'), "leave it out"),
+    (("[constraints]", "[requirements]"), "calls them constraints"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "words"), REFUSED)
+def test_what_is_refused(change, words, tmp_path):
+    text = FILE.replace(*change)
+    assert text != FILE
+    with pytest.raises(InputError) as error:
+        optimisation_of(text, tmp_path / "quick.toml")
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+    assert str(error.value).startswith("quick.toml: ")
+
+
+def test_budget_can_be_set_in_the_call(file):
+    given = optimisation_of(FILE, file, {"designs": 20, "verdict": 50, "solver.step": 0.02})
+    assert (given.budget.designs, given.budget.verdict) == (20, 50)
+    assert given.present.scene.solver.step == 0.02
