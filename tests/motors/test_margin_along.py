@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from motor_rings import PLAIN, ring
+from motor_rings import PLAIN, STALL, ring
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.layout.layout import layout_of
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.rigid.margin import DriveMargin, Passed, least_along, passed, with_margin
 from ringsim.scene import Scene
@@ -22,6 +23,7 @@ from ringsim.stored_state import read_state
 from ringsim.variables import PLANES, Outcome, Status
 
 ECSS = {"kind": "ecss-e-st-33-01c"}
+SPRING = {"kind": "linear", "stiffness": 0.004, "preload": 0.005}
 CUT = {"kind": "cut-cable", "cable": "lower", "span": 1}
 
 
@@ -95,6 +97,55 @@ def test_faults_and_switches_count_from_their_time_on() -> None:
     assert found["least_drive_margin"] == -1.0
     assert found["least_drive_margin_time"] == pytest.approx(0.9)
     assert found["least_drive_margin_angle"] == pytest.approx(60.0 + 120.0 * 0.81, abs=0.1)
+
+
+def virtual_work(planes: slice, angle: float) -> float:
+    """The margin of cables without friction in their pulleys at an angle (rad): their shortening,
+    by differences of the layout, against twelve V-joints of 0.01 N m.
+    """
+
+    def lengths(at: float) -> np.ndarray:
+        layout = layout_of(ring(), 0.5 * (math.pi - at))
+        places = [np.array([layout.sheave(each)[0] for each in path]) for path in layout.paths]
+        return np.array([np.linalg.norm(np.diff(each, axis=0), axis=1).sum() for each in places])
+
+    shortening = (lengths(angle - 1e-5) - lengths(angle + 1e-5)) / 2e-5
+    return STALL * float(shortening[planes].sum()) / (12 * 0.01) - 1.0
+
+
+UPPER, LOWER = "cables__upper__winch__stop_time", "cables__lower__winch__stop_time"
+BOTH, ONE = slice(0, 2), slice(0, 1)
+
+
+@pytest.mark.parametrize(
+    ("values", "least", "time"),
+    [
+        # What is passed after both have been stopped as planned needs no drive.
+        ({UPPER: 0.7, LOWER: 0.9}, (ONE, 60.0 + 120.0 * 0.49), 0.7),
+        ({UPPER: 0.9, LOWER: 0.9}, (BOTH, 60.0), 0.0),
+        # A motor that stops leaves all to the other.
+        ({LOWER: 0.5}, (ONE, 90.0), 0.5),
+        # One that has lost its rope was not stopped: nothing drives when the other is.
+        ({UPPER: 0.9, "faults": [CUT | {"time": 0.5}]}, None, 0.9),
+        # Springs that no winch ever helps: at 180 deg they give half of what resists.
+        ({UPPER: 0.0, LOWER: 0.0, "hinge_spring": SPRING}, -0.5, 1.0),
+    ],
+    ids=["one after the other", "both", "one alone", "lost rope", "springs alone"],
+)  # fmt: skip
+def test_the_margin_ends_where_nobody_drives_on_purpose(
+    values: dict[str, object], least: object, time: float
+) -> None:
+    plain = {"joints__vjoint": {"coulomb": 0.01}, "margin": PLAIN.model_dump()}
+    plain |= {f"cables__{plane}__friction": {"kind": "none"} for plane in PLANES}
+    run = with_margin(opened(0.05), ring(**plain | values))
+    truth = least if isinstance(least, float) else -1.0
+    if isinstance(least, tuple):
+        truth = virtual_work(least[0], math.radians(least[1]))
+    assert run.values["least_drive_margin"] == pytest.approx(truth, rel=1e-6)
+    assert run.values["least_drive_margin_time"] == pytest.approx(time, abs=1e-3)
+    words = "the least drive margin ends at 0.9 s, when the last winch is switched off"
+    both = values.get(LOWER) == 0.9
+    assert (words in run.reason) == both
 
 
 @pytest.mark.parametrize("interval", [0.02, 0.13])
