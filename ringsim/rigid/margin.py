@@ -288,7 +288,8 @@ def with_margin(
     times = outcome.coordinates["time"]
     lock = float(outcome.values.get("deployment_time", math.nan))
     way = passed(times, outcome.values["opening_angle"], lock)
-    drives = [(until, _drive(substituted(one), scene.margin)) for until, one in before]
+    scenes = [*((until, substituted(one)) for until, one in before), (math.inf, scene)]
+    drives = [(until, _drive(one, scene.margin)) for until, one in scenes[:-1]]
     last = DriveMargin(scene, scene.margin)
     drives.append((math.inf, last))
     kinds = list(dict.fromkeys(kind for _, drive in drives if drive for kind in drive.kinds))
@@ -319,6 +320,10 @@ def with_margin(
             "least_drive_margin_time": np.asarray(least.time),
             "least_drive_margin_angle": np.asarray(math.degrees(least.angle)),
         }
+    by_plane = _by_plane(outcome, scenes, scene.margin)
+    if np.isfinite(by_plane).any():
+        values["least_drive_margin_plane"] = by_plane
+        values["least_plane_margin"] = np.asarray(by_plane.min())
     return replace(
         outcome,
         reason=reason,
@@ -327,12 +332,41 @@ def with_margin(
     )
 
 
-def _drive(scene: Scene, standard: MarginStandard) -> DriveMargin | None:
-    """None of a scene whose winches pulled with any force: it had no margin."""
+def _drive(
+    scene: Scene, standard: MarginStandard, plane: int | None = None
+) -> DriveMargin | None:  # fmt: skip
+    """Of both planes, or one; None of a scene whose winches pulled with any force: it had no
+    margin.
+    """
     try:
-        return DriveMargin(scene, standard)
+        return (
+            DriveMargin(scene, standard) if plane is None else PlaneMargin(scene, standard, plane)
+        )
     except InputError:
         return None
+
+
+def _by_plane(
+    outcome: Outcome, scenes: Sequence[tuple[float, Scene]], standard: MarginStandard
+) -> Array:  # fmt: skip
+    """The least margin of each plane at the mean angles of its own V-joints, until it has locked,
+    shape (planes,), of scenes each until a time (s); NaN unless there are cables in two planes.
+    """
+    opening = outcome.values["opening_angle"]
+    locks = outcome.values.get("lock_time", np.full(opening.shape[:2], math.nan)).max(axis=1)
+    found = np.full(len(opening), math.nan)
+    for plane, lock in enumerate(locks.tolist()):
+        way = passed(outcome.coordinates["time"], opening[[plane]], lock)
+        begin = -math.inf
+        for until, scene in scenes:
+            two = scene.cables is not None and len(scene.cables.present()) == 2
+            drive = _drive(scene, standard, plane) if two else None
+            inside = len(way.times) and begin <= way.times[-1] and until > way.times[0]
+            if drive is not None and inside and begin < drive.conditions.end:
+                least = least_along(drive, way.between(begin, until))
+                found[plane] = np.fmin(found[plane], least.margin)
+            begin = until
+    return found
 
 
 # The margin of one plane's drive, were it to carry half of all that resists.

@@ -241,3 +241,36 @@ def test_a_stretch_between_two_output_times_counts() -> None:
     found = with_margin(opened(0.1), whole, [(0.42, whole), (0.48, held)])
     assert float(found.values["least_drive_margin"]) == -1.0
     assert 0.42 - 1e-9 <= float(found.values["least_drive_margin_time"]) <= 0.48 + 1e-9
+
+
+def test_each_plane_has_the_margin_of_its_own_cable_along_its_own_angles() -> None:
+    """A jam in the lower cable at 0.5 s, at 90 deg, which the mean of both planes all but hides."""
+    plain = {"joints__vjoint": {"coulomb": 0.01}, "margin": PLAIN.model_dump()}
+    plain |= {f"cables__{plane}__friction": {"kind": "none"} for plane in PLANES}
+    jam = {"kind": "jammed-pulley", "cable": "lower", "pulley": 1, "time": 0.5}
+    found = with_margin(opened(0.05), ring(**plain, faults=[jam])).values
+    whole = virtual_work(BOTH, math.radians(60.0))
+    # The span from the winch to the first pulley keeps its length: behind the jam nothing pulls.
+    assert found["least_drive_margin_plane"] == pytest.approx([whole, -1.0], rel=1e-6)
+    assert found["least_plane_margin"] == pytest.approx(-1.0)
+    alone = virtual_work(ONE, math.radians(90.0))
+    assert found["least_drive_margin"] == pytest.approx(alone, rel=1e-6)
+    single = with_margin(opened(0.05), ring(**plain, cables__lower="none")).values
+    assert "least_plane_margin" not in single
+
+
+def test_a_plane_counts_what_it_passed_until_it_has_locked() -> None:
+    scene = netted()
+    drive = DriveMargin(scene, EcssMechanisms())
+    truth = drive.least()
+    run, last = opened(0.02), math.degrees(truth.angle) - 20.0
+    run.values["opening_angle"][1] = np.minimum(run.values["opening_angle"][1], last)
+    found = with_margin(run, scene).values["least_drive_margin_plane"]
+    # Planes are alike, so that the margin of each is that of both at its own angle.
+    both = [truth.margin, drive.at(math.radians(last)).margin]
+    assert found == pytest.approx(both, rel=1e-9)
+    stopped = netted(**{UPPER: 1.1})
+    assert with_margin(run, stopped).values["least_drive_margin_plane"][0] == -1.0
+    run.values["lock_time"] = np.repeat([[1.0], [np.nan]], 6, axis=1)
+    found = with_margin(run, stopped).values["least_drive_margin_plane"]
+    assert found[0] == pytest.approx(truth.margin, rel=1e-9)
