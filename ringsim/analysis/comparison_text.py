@@ -235,7 +235,8 @@ def _outputs(found: xr.Dataset) -> Table:
                 continue
             largest = number_text(most)
             place = str(found[f"{name}_largest_difference_sample"].item())
-            together = f"{found[f'{name}_rank_correlation'].item():+.2f}".replace("+nan", "-")
+            rank = found[f"{name}_rank_correlation"].item()
+            together = "-" if np.isnan(rank) else f"{rank:+.2f}"
         fine = digits_of(min(first, second), max(first, second))
         rows.append((
             name, unit_text(unit),
