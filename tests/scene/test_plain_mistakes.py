@@ -345,6 +345,16 @@ def test_refusals_of_campaigns_tell_the_cure(tmp_path: Path) -> None:
     line = refused("campaign", path, "--dry-run")
     assert re.search(r"joints\.vjoint\.coulomb = -0\.\d{1,11} N m must be at least 0 N m: ", line)
     assert line.endswith('draw it with kind = "truncated", low = 0, of = { kind = "normal", ... }')
+    # What another value of the scene bounds no end of a distribution cures.
+    wide = law.replace("-0.02", "0.02")
+    path.write_text(f'{CAMPAIGN}"rods.diagonal.inner_diameter" = {wide}\n')
+    line = refused("campaign", path, "--dry-run")
+    assert "must be below outer_diameter" in line
+    assert "truncated" not in line
+    steep = law.replace("-0.02", "179.95")
+    path.write_text(f'{CAMPAIGN}"structure.opening_angle" = {steep}\n')
+    line = refused("campaign", path, "--dry-run")
+    assert 'draw it with kind = "truncated", high = 179.9, of =' in line
     wanted = "[requirements]\nasynchrony_max = { max = 9.0, probability = 95, confidence = 0.9 }"
     path.write_text(f"{CAMPAIGN}\n{wanted}\n")
     line = refused("campaign", path, "--dry-run")
