@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ringsim.campaign.panels import Panel, Sweep, by_engines
+from ringsim.campaign.studies import Panel, Sweep, by_engines
 from ringsim.cli.studies import draw_map
 from ringsim.scene import load_scene
 

@@ -248,7 +248,7 @@ class _Search:
         self._told.put(None)
 
     def _at(self, point: Array) -> tuple[float, Array]:
-        point = np.round(np.clip(point, 0.0, 1.0), DIGITS)
+        point = np.asarray(np.round(np.clip(point, 0.0, 1.0), DIGITS), dtype=np.float64)
         key = point.tobytes()
         if key not in self._known:
             self._asked.put(point)

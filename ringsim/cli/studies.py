@@ -8,7 +8,7 @@ from typing import Any
 import click
 import tomli_w
 
-from ringsim.campaign.panels import Panel, by_engines, panels_over
+from ringsim.campaign.studies import Panel, by_engines, panels_over
 from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS, draw_result
 from ringsim.execution.mpi import launched_size
 from ringsim.files import read_text, write_text

@@ -12,8 +12,7 @@ from click.testing import CliRunner
 from loops import for_each
 
 from ringsim.analysis.stability import ENDED, OK
-from ringsim.campaign.panels import Panel, by_engines, panels_over, sweep_of
-from ringsim.campaign.studies import pieces_of
+from ringsim.campaign.studies import Panel, by_engines, panels_over, pieces_of, sweep_of
 from ringsim.cli import cli
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
