@@ -554,9 +554,10 @@ class Optimisation:
 
     Examples
     --------
-    >>> Optimisation("ring18", {}, {}, {})
+    >>> force = {"f": {"low": 2, "high": 1, "shared": ["loads.force"]}}
+    >>> Optimisation("ring18", force, {"deployment_time": {"minimise": "mean"}}, {})
     Traceback (most recent call last):
-    ringsim.refusal.InputError: ringsim.Optimisation: variables = {} must have at least 1 items
+    ringsim.refusal.InputError: ringsim.Optimisation: variables.f.low = 2 must be below high = 1
     """
 
     def __init__(
