@@ -17,7 +17,6 @@ from ringsim.analysis.design import (
     distribution_of,
     endings,
     inputs,
-    law_text,
     paths_of,
     placement,
     population_of,
@@ -45,6 +44,7 @@ from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.analysis.worst import NOTE, losses, margins
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
+from ringsim.sampling.distributions import law_text
 from ringsim.variables import about, flags_of
 
 Both = tuple[xr.Dataset, xr.Dataset]

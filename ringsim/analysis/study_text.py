@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.design import FAILED_RUNS, law_text, placement, population_of
+from ringsim.analysis.design import FAILED_RUNS, placement, population_of
 from ringsim.analysis.influence_text import (
     FEW_DECIDE,
     influence_tables,
-    refusals,
     sensitivity_tables,
     what_matters,
     what_separates,
@@ -35,6 +34,7 @@ from ringsim.analysis.reweighting import (
     REWEIGHTED_STATISTICS,
     SOBOL,
 )
+from ringsim.analysis.sensitivity import refusals
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
@@ -49,6 +49,7 @@ from ringsim.analysis.worst import (
     worst_tables,
 )
 from ringsim.refusal import InputError
+from ringsim.sampling.distributions import law_text
 from ringsim.tables import (
     Table,
     counted,

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import (
+    DIFFERENCE,
     FAILED_RUNS,
     LOST,
     blocks_of,
@@ -21,6 +22,7 @@ from ringsim.analysis.design import (
     paths_of,
     place_names,
     placement,
+    planes_apart,
     short_of_goal,
 )
 from ringsim.analysis.indices import UNLIKELY, dependence
@@ -77,7 +79,8 @@ def unusual(
     ``drawn`` that separate its failure, the best first, and whether they are larger there.
 
     Of an input with m places the one that is farthest out among all values counts, with m times
-    the share: some place of every sample is far out by chance.  Its mean counts beside.
+    the share: some place of every sample is far out by chance.  Its mean counts beside, and large
+    differences of the two planes' inputs.
 
     Of a design that changes one input at a time what is other than in its base case.
     """
@@ -85,27 +88,33 @@ def unusual(
         return [other_than_base(campaign, place) for place in places]
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     variables = {k: v for k, v in variables.items() if v.attrs.get("path") != "solver.error_bars"}
-    columns, found = drawn(campaign), list[str]()
+    columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
     for place, sides in zip(places, separating or [{}] * len(places), strict=True):
         told, named = list[str](), set[str]()
         for name, larger in sides.items():
             if name not in columns.names or len(told) == _MOST:
                 continue
             k = columns.names.index(name)
-            values, variable = columns.values[:, k], variables[columns.input[k]]
+            values, own = columns.values[:, k], columns.input[k]
+            variable = both[own][0] if own in both else variables[own]
             value = values[place] if larger else -values[place]
             out = float(np.mean((values if larger else -values) >= value))
-            if variable.name in named or out > (1.0 if _has_words(variable) else _SIDE):
+            if own in named or out > (1.0 if _has_words(variable) else _SIDE):
                 continue
-            named.add(str(variable.name))
+            named.add(own)
             told.append(
                 _word(variable, place)[1] if _has_words(variable)
                 else _told(name, values, float(values[place]), _units(variable))
             )  # fmt: skip
         odd = [
-            each for variable in variables.values() if variable.name not in named
+            each for own, variable in variables.items() if own not in named
             for each in _odd(variable, place)
         ]  # fmt: skip
+        for name in (each for each in both if each in columns.names and each not in named):
+            values = columns.values[:, columns.names.index(name)]
+            if (share := float(np.mean(values >= values[place]))) <= RARE:
+                words = _told(name, values, float(values[place]), _units(both[name][0]))
+                odd.append(_Oddity(share, words))
         told += [each.words for each in sorted(odd, key=lambda each: (not each.before, each.share))]
         found.append("; ".join(told[:_MOST]) or "nothing unusual")
     return found
@@ -191,7 +200,7 @@ def _told(name: str, rows: Array, value: float, units: str) -> str:
     """A value among those of all samples."""
     middle = float(np.median(rows))
     end = {rows.min(): ", the lowest", rows.max(): ", the highest"}.get(value, "")
-    if units == "K":
+    if units == "K" and not name.startswith(DIFFERENCE):
         word = "cold" if value < middle else "hot"
         return f"{name} {value:.4g} K ({value - _ZERO:+.0f} C, {word}{end})"
     if rows.min() > 0.0 or rows.max() < 0.0:
