@@ -31,6 +31,7 @@ from ringsim.analysis.intervals import ROUND_OFF, Mask, good, lost, numbers, qua
 from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
+from ringsim.outputs.balance import exceeded
 from ringsim.overrides import flat
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, chance_text, counted, number_text, readable, with_unit
@@ -409,12 +410,13 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
 
     ``limit_text`` (as "limits.tension = 80 N"), ``limit_output``, ``limit_margin`` (limit over the
     largest value, less 1), ``limit_value`` and ``limit_sample``; a limit holds for the whole run,
-    so that values behind the last lock count, too.  Behind these the drive margin of scenes with
-    one, which is one already.  Empty without any.
+    so that values behind the last lock count, too: ``limit_of`` says so where one is larger than
+    the peak, ``limit_output``.  Behind these the drive margin of scenes with one, which is one
+    already.  Empty without any.
     """
     scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
     own = {path: name for name in inputs(campaign) for path in paths_of(campaign[name])}
-    rows = list[tuple[str, str, float, float, int]]()
+    rows = list[tuple[str, str, str, float, float, int]]()
     for limit, peak, series in _limited():
         path = f"limits.{limit}"
         if peak not in campaign or (path not in scene and path not in own):
@@ -427,17 +429,20 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         k, units = int(np.nanargmin(ratio)), quantities()[peak].units
         bound = float(np.broadcast_to(allowed, ratio.shape)[k])
         told = f"{path} = {with_unit(f'{bound:g}', units)}"
-        rows.append((told, peak, float(ratio[k]), float(values[k]), k))
+        later = series and exceeded(numbers(campaign, peak)[k], values[k])
+        of = f"{series} after the last lock, as recorded" if later else peak
+        rows.append((told, peak, of, float(ratio[k]), float(values[k]), k))
     least = np.where(good(campaign), numbers(campaign, _DRIVE), np.nan)
     if np.isfinite(least).any():
         k = int(np.nanargmin(least))
-        rows.append((f"{_DRIVE} >= 0", _DRIVE, float(least[k]), float(least[k]), k))
+        rows.append((f"{_DRIVE} >= 0", _DRIVE, _DRIVE, float(least[k]), float(least[k]), k))
     if not rows:
         return xr.Dataset()
-    texts, names, margin, value, places = zip(*rows, strict=True)
+    texts, names, of, margin, value, places = zip(*rows, strict=True)
     columns = {
         "text": (np.array(texts, dtype=object), {"long_name": "limit of the scene"}),
         "output": (np.array(names, dtype=object), {"long_name": "output that it bounds"}),
+        "of": (np.array(of, dtype=object), {"long_name": "what has the worst value"}),
         "margin": (np.array(margin), about("limit over the worst value, less 1; drive margin")),
         "value": (np.array(value), about("worst value of all samples, in the output's unit")),
         "sample": (campaign["sample"].to_numpy()[[*places]], about("sample with that value")),
@@ -473,12 +478,12 @@ def margin_table(analysis: xr.Dataset) -> Table:
         return Table((), ())
     rows = []
     columns = (analysis[f"limit_{word}"].values.tolist()
-               for word in ("text", "output", "margin", "value", "sample"))  # fmt: skip
-    for told, name, margin, value, sample in zip(*columns, strict=True):
+               for word in ("text", "output", "of", "margin", "value", "sample"))  # fmt: skip
+    for told, name, of, margin, value, sample in zip(*columns, strict=True):
         factor, units = readable(quantities()[name].units, value)
         worst = with_unit(number_text(factor * value), units)
         short = "" if margin >= 0.0 else ": NOT enough"
-        rows.append((told, name, worst, f"{margin:+.3g}{short}", str(sample)))
+        rows.append((told, of, worst, f"{margin:+.3g}{short}", str(sample)))
     notes = [
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"

@@ -129,8 +129,19 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             text = f"{text} {unit_text(unit)}".rstrip()
             if np.isfinite(bar):  # samples of a campaign need not have one
                 text += f" +- {bar:.2g}"
-            found[variable.name] = f"{text} {output().told(values, span_names)}".rstrip()
+            text = f"{text} {output().told(values, span_names)}".rstrip()
+            series = values.get(variable.largest_of, ()) if output.limit else ()
+            # A limit holds for the whole run, a peak may count up to the last lock. By how much it
+            # is larger the series does not say: what ends a run counts all steps.
+            if np.size(series) and exceeded(number, factor * float(np.nanmax(series))):
+                text += "; more than that after the last lock"
+            found[variable.name] = text
     return found
+
+
+def exceeded(peak: float, later: float) -> bool:
+    """Whether a series is larger than its peak: not by the digits alone that files leave it."""
+    return later > peak * (1.0 + 1e-6)
 
 
 # Numerical error of a run, estimated from a second run with half the steps and twice the elements.

@@ -21,6 +21,15 @@ def test_numbers_end_with_the_digits_of_their_error_bars() -> None:
     assert told["peak_tension"] == "31.968 N"  # no error is known
 
 
+def test_a_tension_that_is_larger_behind_the_last_lock_is_no_peak_and_told() -> None:
+    """In single precision, as files have it, 31.968 N are larger by 1e-8 of it."""
+    values = {"peak_tension": np.array(31.968)}
+    for most, more in ((31.968, False), (32.0, True)):
+        values["cable_tension"] = np.array([[[np.nan, 12.0, most]]], dtype="f4")
+        told = summary(values, {})["peak_tension"]
+        assert told.endswith("; more than that after the last lock") == more
+
+
 def test_loads_are_told_by_how_far_they_stay_below_their_limits() -> None:
     limits = {"limits.tension": 40.0, "limits.rod_stress": 3e7, "record.stress": True}
     scene = load_scene("ring18-cable").with_values(limits)
