@@ -14,8 +14,10 @@ from ringsim.analysis.design import (
     FAILED_RUNS,
     Drawn,
     Placement,
+    campaign_file,
     drawn,
     endings,
+    learnt_lines,
     short_of_goal,
 )
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
@@ -92,9 +94,9 @@ def _apart(inputs: Drawn) -> NDArray[np.bool_]:
     return np.asarray((own[:, None] != own) | (place[:, None] & place))
 
 
-def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
-    """Variables along ``pair``: the names of both inputs and their correlation; none without a
-    pair.  ``used``, shape (samples,), are the samples that count.
+def confounded(inputs: Drawn, used: NDArray[np.bool_], cure: str) -> dict[str, Any]:
+    """Variables along ``pair``: the names of both inputs and their correlation, with its ``cure``;
+    none without a pair.  ``used``, shape (samples,), are the samples that count.
     """
     found = pairs(inputs.values[used], _apart(inputs))
     if not found:
@@ -106,7 +108,8 @@ def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
             names[[each.second for each in found]], {"long_name": "second input of the pair"},
         ),
         "correlation": (
-            [each.correlation for each in found], about("rank correlation of the two inputs"),
+            [each.correlation for each in found],
+            about("rank correlation of the two inputs") | {"cure": cure},
         ),
         "share": (
             [each.share for each in found],
@@ -114,6 +117,13 @@ def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
         ),
     }  # fmt: skip
     return {f"pair_{name}": ("pair", *each) for name, each in columns.items()}
+
+
+def _cure(campaign: xr.Dataset, placed: Placement) -> str:
+    """What parts inputs that go together in the samples, if anything does."""
+    if campaign_file(campaign).get("correlations") or learnt_lines(campaign):
+        return "they are drawn so (correlations, or a test), and more samples would not part them"
+    return "draw more samples" + ', or use design.kind = "random"' * (not placed.independent)
 
 
 def partners(analysis: xr.Dataset) -> dict[str, set[str]]:
@@ -143,8 +153,7 @@ def confounding_notes(analysis: xr.Dataset, told: Collection[str]) -> list[str]:
     return [
         "these inputs are correlated in the samples, more than by chance (share of the variance "
         f"of one that the other explains, rank correlation): {named}{more}, so that the effect "
-        "of one may be taken for that of the other: draw more samples, or use design.kind = "
-        '"random"'
+        f"of one may be taken for that of the other: {analysis['pair_correlation'].attrs['cure']}"
     ]
 
 
@@ -231,7 +240,7 @@ def influence(
         ("input", "bound"), np.array(inputs.span, dtype="i8"),
         about("first of its sections (pulleys, ...), and the one after the last"),
     )  # fmt: skip
-    found |= confounded(inputs, ok)
+    found |= confounded(inputs, ok, _cure(campaign, placed))
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
     if groups:
         coords["group"] = np.array([*groups], dtype=object)
