@@ -438,11 +438,11 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         rows.append((f"{_DRIVE} >= 0", _DRIVE, _DRIVE, float(least[k]), float(least[k]), k))
     if not rows:
         return xr.Dataset()
-    texts, names, of, margin, value, places = zip(*rows, strict=True)
+    texts, names, told_of, margin, value, places = zip(*rows, strict=True)
     columns = {
         "text": (np.array(texts, dtype=object), {"long_name": "limit of the scene"}),
         "output": (np.array(names, dtype=object), {"long_name": "output that it bounds"}),
-        "of": (np.array(of, dtype=object), {"long_name": "what has the worst value"}),
+        "of": (np.array(told_of, dtype=object), {"long_name": "what has the worst value"}),
         "margin": (np.array(margin), about("limit over the worst value, less 1; drive margin")),
         "value": (np.array(value), about("worst value of all samples, in the output's unit")),
         "sample": (campaign["sample"].to_numpy()[[*places]], about("sample with that value")),

@@ -475,8 +475,17 @@ def law_text(says: Mapping[str, Any]) -> str:
     'uniform, low 0.7, high 1'
     >>> law_text({"kind": "truncated", "high": 5.0, "of": {"kind": "exponential", "mean": 2.0}})
     'truncated, high 5, of (exponential, mean 2)'
+    >>> law_text({"kind": "calibrated", "of": {"kind": "normal", "mean": 2.0,
+    ...           "standard_deviation": 1.0}, "shift": 0.5, "remaining_scatter": 0.1, "data": "A"})
+    'median 2.5, 90 % in 2.336 .. 2.664 after A (before: normal, mean 2, standard deviation 1)'
     """
     own = {key: value for key, value in says.items() if key not in ("shared", "each_section")}
+    if own.get("kind") == "calibrated":  # its numbers are those of a standard normal variable
+        low, median, high = Calibrated.model_validate(own).quantile(np.array([0.05, 0.5, 0.95]))
+        return (
+            f"median {number_text(median)}, 90 % in {number_text(low)} .. {number_text(high)} "
+            f"after {own.get('data') or 'a test'} (before: {law_text(own['of'])})"
+        )
     kind = str(own.pop("kind", own.pop("text", "")))
 
     def told(value: Any) -> str:
