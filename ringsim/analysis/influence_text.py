@@ -255,7 +255,7 @@ def sensitivity_tables(analysis: xr.Dataset) -> list[Table]:
         found.append(_told(analysis, names))
     if "second_order_index" in analysis:
         found.append(_second(analysis))
-    return found + refusals(analysis)
+    return found + refusals(analysis, every=True)
 
 
 def measure_notes(analysis: xr.Dataset) -> list[str]:
@@ -275,8 +275,8 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
         told = "; each word of an input counts by itself, so that these may add up to more than 1"
         return [
             "first-order index: share of the variance that one input alone explains, estimated "
-            "from bins of its values and corrected for chance; too small if the output is "
-            "strongly nonlinear within a bin" + told * words
+            "from bins of its values and corrected for chance, so that one of about 0 may be below "
+            "zero; too small if the output is strongly nonlinear within a bin" + told * words
         ]
     return []
 

@@ -15,7 +15,7 @@ from ringsim.analysis import indices
 from ringsim.analysis.design import Blocks, Placement, blocks_of, drawn, population_of
 from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.influence import groups_of
-from ringsim.analysis.intervals import good, lost, numbers, quantities, ran, varies
+from ringsim.analysis.intervals import good, is_moment, lost, numbers, quantities, ran, varies
 from ringsim.analysis.requirements import Requirement
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, chance_text, counted
@@ -232,13 +232,15 @@ _NAMED = 5
 """Outputs that a line names at most."""
 
 
-def refusals(analysis: xr.Dataset) -> list[Table]:
-    """What became of outputs that samples lack, as notes."""
-    lines = list(_gate(analysis))
+def refusals(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
+    """What became of outputs that samples lack, as notes; of when peaks were only if ``every`` one
+    is told.
+    """
+    lines = list(_gate(analysis, every=every))
     return [Table((), (), lines)] if lines else []
 
 
-def _gate(analysis: xr.Dataset) -> Iterator[str]:
+def _gate(analysis: xr.Dataset, *, every: bool) -> Iterator[str]:
     """What became of outputs that samples lack: why there is no index, or why there is one."""
     if "missing_by_inputs" not in analysis:
         return
@@ -247,7 +249,7 @@ def _gate(analysis: xr.Dataset) -> Iterator[str]:
     needed = ("output", "missing", "missing_lost", "missing_by_inputs")
     columns = (analysis[name].values.tolist() for name in needed)
     for output, count, failed, chance in zip(*columns, strict=True):
-        if count:
+        if count and (every or not is_moment(output)):
             outputs.setdefault((count, failed, round(chance, 4)), []).append(output)
     for (count, failed, chance), names in outputs.items():
         who = ", ".join(names[:_NAMED]) + (
