@@ -171,6 +171,15 @@ def test_tables_name_settings_as_overrides(study: xr.Dataset) -> None:
     assert in_words(study, 0) == "as it stands"
 
 
+def test_where_no_setting_is_good_enough_the_best_one_is_told(study: xr.Dataset) -> None:
+    """Every error five times as large as it is, of a reference that is known as well as before."""
+    worse = study.assign(bound=5.0 * study.bound, cheapest=0 * study.cheapest - 1)
+    least = 5.0 * float(study.bound.sel(output="deployment_time")[study.eligible].min())
+    (row,) = (line for line in tables(worse, "A study").splitlines()
+              if line.startswith("| deployment time | ") and "none tried" in line)  # fmt: skip
+    assert f"none tried: {least:.2g} at best" in row
+
+
 def test_a_terminal_has_the_same_tables_without_marks_of_markdown(study: xr.Dataset) -> None:
     told, text = "\n".join(lines(study, "A study")), tables(study, "A study")
     assert told.startswith("A study\n\nThe cheapest setting for each error.")
