@@ -209,13 +209,20 @@ def _course(
 ) -> int:  # fmt: skip
     import xarray as xr
 
-    from ringsim.campaign.calibration import calibration_of, run_course
+    from ringsim.campaign.calibration import Given, calibration_of, run_course
+
+    def given() -> Given:  # where stages are ordered: on the first rank
+        found = calibration_of(read_text(file), file, settings)
+        stages, each = found.budget.stages, found.members
+        click.echo(
+            f"{found.campaign.specification.name}: {counted(stages * each, 'run')} in "
+            f"{counted(stages, 'stage')} of {each}, one after the other; what has run is kept"
+        )
+        return found
 
     # Under an MPI launcher each rank has one.
     most = workers or (len(os.sched_getaffinity(0)) if launched_size() == 1 else None)
-    ended, path = run_course(
-        lambda: calibration_of(read_text(file), file, settings), most, out, planning=planning
-    )
+    ended, path = run_course(given, most, out, planning=planning)
     if ended.refused is not None:
         if ended.first:
             raise ended.refused
