@@ -109,6 +109,10 @@ def instead_of(name: str, *senses: str) -> str:
 # The main numbers of a run in words.
 
 
+_IF_ANY = ("longest_slack",)
+"""Numbers that are told if they are above zero only."""
+
+
 def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
     """What is told of each main number that is known, by variable: how much, when and where."""
     found = {}
@@ -117,7 +121,7 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             if variable.summary is None:
                 continue
             number = np.asarray(values.get(variable.name, np.nan)).item()
-            if not np.isfinite(number):
+            if not np.isfinite(number) or (not number and variable.name in _IF_ANY):
                 continue
             # Whole numbers of which some are missing come as floats out of files.
             number = int(number) if variable.dtype.startswith("i") else number
