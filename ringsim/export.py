@@ -52,8 +52,10 @@ def meaning_of(variable: xr.DataArray) -> str:
 
 BLOCK = 1 << 22
 """Rows, about, that are held at once."""
-MANY = 5_000_000
-"""Rows of a table above which few programs open it, and it takes minutes to write."""
+LARGE = 100e6
+"""Bytes of all tables above which few programs open them, and they take minutes to write."""
+_LETTERS = {"f": 10.0, "O": 12.0, "U": 12.0}
+"""Bytes of a cell with its comma, by kind, about; whole numbers have five."""
 
 
 def write_csv(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
@@ -83,9 +85,19 @@ def write_csv(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
     return [*written, path]
 
 
-def most_rows(dataset: xr.Dataset) -> int:
-    """Rows of the longest table that ``write_csv`` would write, at most."""
-    return max((_rows(dataset, dims) for dims in _tables(dataset)), default=0)
+def size_of_csv(dataset: xr.Dataset) -> float:
+    """Bytes that ``write_csv`` would write, to a third or so: times after a run's end are no rows,
+    and numbers have as many digits as they need.
+    """
+    share, found = 1.0, 0.0
+    if {"time", "final_time"} <= set(dataset.variables) and dataset.sizes["time"] > 1:
+        ended = np.nan_to_num(dataset["final_time"].to_numpy() / float(dataset["time"][-1]))
+        share = float(np.clip(ended, 0.0, 1.0).mean())
+    for dims, names in _tables(dataset).items():
+        kinds = [dataset[name].dtype.kind for name in (*names, *(d for d in dims if d in dataset))]
+        letters = sum(_LETTERS.get(kind, 5.0) for kind in kinds)
+        found += letters * _rows(dataset, dims) * (share if "time" in dims else 1.0)
+    return found
 
 
 def _rows(dataset: xr.Dataset, dims: tuple[str, ...]) -> int:

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Iterable, Sequence
-from decimal import Decimal
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from typing import NamedTuple
 
 from tabulate import DataRow, TableFormat, tabulate
@@ -98,6 +98,23 @@ def known_to(
 def number_text(value: float, digits: int = 4) -> str:
     """A number with so many digits, or a dash."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
+
+
+def bound_text(value: float, digits: int = 4, *, upper: bool) -> str:
+    """A bound with so many digits, or a dash: an upper one rounded up and a lower one down, so that
+    what is printed holds as surely as what was computed.
+
+    >>> bound_text(0.17464, 3, upper=True), bound_text(0.82538, upper=False)
+    ('0.175', '0.8253')
+    >>> bound_text(0.9, upper=False), bound_text(1.0 - 0.9, upper=True)
+    ('0.9', '0.1')
+    """
+    if not math.isfinite(value) or value == 0.0:
+        return number_text(value, digits)
+    # Twelve digits, beyond which there is round-off only.
+    exact = Decimal(f"{value:.12g}")
+    last = Decimal((0, (1,), exact.adjusted() + 1 - digits))
+    return number_text(float(exact.quantize(last, ROUND_CEILING if upper else ROUND_FLOOR)), digits)
 
 
 def digits_of(least: float, most: float) -> int:

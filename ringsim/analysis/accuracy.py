@@ -264,7 +264,9 @@ _ADVICE = (
 _COSTS = (
     "Errors of all settings, marked (bold or *) where no other setting is both cheaper and more "
     "accurate. The cost is processor time from a fit over all runs (to residuals, Jacobians and "
-    "steps), so that scatter of single timings averages out:"
+    "steps), so that scatter of single timings averages out. The uncertainty of the reference is "
+    "not in these errors; one that is far below it belongs to a setting that the reference is "
+    "made of:"
 )
 _ORDERS = (
     "Observed orders: for steps the slope of their error (against the limit of fine steps with "
@@ -342,7 +344,10 @@ def _advice(found: xr.Dataset) -> Table:
         of = found.sel(output=column)
         rows.append([name])
         for target, cheapest in zip(targets, of.cheapest.values, strict=True):
-            otherwise = "reference too coarse" if of.uncertainty >= target else "none tried"
+            least = float(of.bound.where(of.eligible).min())
+            otherwise = f"none tried: {least:.2g} at best"
+            if of.uncertainty >= target:
+                otherwise = "reference too coarse"
             words = f"{in_words(of, cheapest)}, {of.cost.values[cheapest]:.3g} s"
             rows[-1].append(words if cheapest >= 0 else otherwise)
     return Table(["error of", *(f"{target:g}" for target in targets)], rows)

@@ -17,7 +17,6 @@ from ringsim.analysis.design import (
     distribution_of,
     endings,
     inputs,
-    law_text,
     paths_of,
     placement,
     population_of,
@@ -45,6 +44,7 @@ from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.analysis.worst import NOTE, losses, margins
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
+from ringsim.sampling.distributions import law_text
 from ringsim.variables import about, flags_of
 
 Both = tuple[xr.Dataset, xr.Dataset]
@@ -118,6 +118,24 @@ def _kept(both: Both, held: tuple[Mask, Mask]) -> dict[str, Event]:
         first, second = (good(each) & ~violations(each, name, wanted) for each in both)
         found[wanted.told(name)] = Event((first, second), held)
     return found
+
+
+def _moved(both: Both, placed: Placements) -> list[str]:
+    """What each campaign says of requirements on one output whose limits differ, as "peak_tension
+    <= 20 N: met -> peak_tension <= 60 N: not met".
+    """
+    one, other = (required_by(each.attrs) for each in both)
+    lines = []
+    for name in (n for n in one if n in other and one[n].told(n) != other[n].told(n)):
+        words = []
+        for campaign, its, wanted in zip(both, placed, (one, other), strict=True):
+            try:
+                verdict = judge(campaign, {name: wanted[name]}, its)["verdict"].item()
+            except InputError:  # its file does not tell it
+                break
+            words.append(f"{wanted[name].told(name)}: {Verdict(verdict).words}")
+        lines += [" -> ".join(words)] * (len(words) == len(both))
+    return lines
 
 
 def _verdicts(both: Both, placed: Placements, texts: list[str]) -> NDArray[np.int8]:
@@ -219,10 +237,12 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
     ``NAME_difference_interval`` (bound), ``NAME_samples`` (side) in its unit, and for pairs
     ``NAME_largest_difference`` with ``NAME_largest_difference_sample`` and
     ``NAME_rank_correlation`` of both (NaN of few pairs, and where either side hardly differs
-    between samples); an output that only one of them has is missing in the other, and in the
+    between samples) and ``NAME_spread`` (side); an output that only one of them has is missing in
+    the other, and in the
     difference.  The pairs whose outcome
     differs along ``change``; shares of outcomes along ``kind`` and of samples that meet a
-    requirement along ``requirement``, see ``differences_of_shares``; the margins to equal limits of
+    requirement along ``requirement``, see ``differences_of_shares``, and the verdicts on those
+    whose limits differ as lines in the attribute ``moved``; the margins to equal limits of
     both along ``limit``; the scenes' values that differ along ``setting``, by path.  Samples are
     those that ``analyse`` counts; means and shares are those of populations, and of pairs of grids
     and lists.  ``pairing`` among the attributes says what is paired; ``names`` are what tables and
@@ -250,6 +270,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             "intervals": next(
                 (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
             ),
+            "moved": "" if single else "\n".join(_moved((one, other), placed)),
             NOTE: "; ".join(f"{side}: {each}" for side, each in notes.items() if each),
         },
     )  # fmt: skip
@@ -447,6 +468,8 @@ def _output(
             (), np.int64(where), "sample of the first with the largest difference",
         )  # fmt: skip
         rows["rank_correlation"] = (), together, "rank correlation of pairs"
+        spreads = np.array([each.std() if len(each) else np.nan for each in used])
+        rows["spread"] = "side", spreads, "standard deviation of the samples compared"
     meaning, units = both[0][name].attrs.get("long_name", name), quantities()[name].units
     found = {}
     for word, (dims, each, words) in rows.items():

@@ -33,6 +33,10 @@ _FRACTIONS = 999.5
 _LOW = 0.5
 """Rank correlation of pairs below which one campaign hardly tells which samples of the other are
 bad: it explains a quarter of the variance of ranks."""
+_OPPOSITE = -0.7
+"""Rank correlation below which the worst of one are the best of the other: half of the variance."""
+_STILL = 0.01
+"""Standard deviation over the mean below which the order of samples is of no interest."""
 _SHORT = 16
 """Letters of a name up to which it heads columns."""
 
@@ -57,7 +61,8 @@ def head_lines(found: xr.Dataset) -> list[str]:
     for side, name in zip(("first", "second"), names_of(found), strict=True):
         title = found.attrs[side]
         if title or name != side:
-            told = f" ({found.attrs[f'{side}_name']})" if title and name != side else ""
+            own = found.attrs[f"{side}_name"]
+            told = f" ({own})" if title and name != side and own != title else ""
             lines.append(f"{side}: {title or found.attrs[f'{side}_name']}{told}")
     lines.append(f"{found.attrs['pairing']}{pairs}")
     lines += [*filter(None, [found.attrs[NOTE], found.attrs["intervals"]]), *_cut_off(found)]
@@ -65,19 +70,25 @@ def head_lines(found: xr.Dataset) -> list[str]:
 
 
 def _turned(found: xr.Dataset) -> Iterator[str]:
-    """Main outputs by which the samples of one are in another order than those of the other."""
-    turned, apart = dict[str, float](), dict[str, float]()
+    """Main outputs by which the samples of one are in another order than those of the other, of
+    those that vary.
+    """
+    turned, tend, apart = dict[str, float](), dict[str, float](), dict[str, float]()
     for name, variable in quantities().items():
         if variable.summary is None or f"{name}_rank_correlation" not in found:
             continue
         together = found[f"{name}_rank_correlation"].item()
+        sizes = np.abs(found[f"{name}_mean"].values)
+        if (found[f"{name}_spread"].values < _STILL * sizes).any():
+            continue
         pairs = int(found[f"{name}_samples"].values[0])
         if together < -float(largest_by_chance(pairs, np.zeros(()), 1)):
-            turned[name] = together
+            (turned if together < _OPPOSITE else tend)[name] = together
         elif together < _LOW:
             apart[name] = together
     for some, sense in (
         (turned, "turn round: samples that are the worst in one are the best in the other"),
+        (tend, "tend to turn round: samples that are bad in one are rather good in the other"),
         (apart, "hardly go together: the worst samples of one are not those of the other"),
     ):
         if some:
@@ -122,7 +133,7 @@ def sections(found: xr.Dataset) -> dict[str, Section]:
             _shares(found, "kind", "kind", "outcome"), _changed(found)
         ]),
         Section("requirements", "Requirements", [
-            _shares(found, "kept", "requirement", "samples that meet")
+            _shares(found, "kept", "requirement", "samples that meet"), _moved(found)
         ]),
         Section("limits", "Margins to limits", [_limits(found)]),
         Section("outputs", "Numbers", [_outputs(found)]),
@@ -171,6 +182,12 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
         heads += tuple(f"verdict in {name}" for name in names_of(found))
     columns = 3 if single else len(heads)
     return marked(Table(heads[:columns], [row[:columns] for row in rows]), found)
+
+
+def _moved(found: xr.Dataset) -> Table:
+    """The verdicts on requirements whose limits differ: shares that meet them are of two things."""
+    lines = found.attrs["moved"].split("\n") if found.attrs["moved"] else []
+    return Table((), (), [f"limits differ: {line}" for line in lines])
 
 
 def _limits(found: xr.Dataset) -> Table:

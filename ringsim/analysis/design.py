@@ -5,9 +5,10 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import re
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,12 +21,11 @@ from ringsim.analysis.intervals import NONE, NOTHING, Interval, good, numbers, s
 from ringsim.choice import kind_of, kinds_of
 from ringsim.files import DESIGN, MERGED, campaign_cure
 from ringsim.outputs import VARIABLES
-from ringsim.refusal import InputError, show
+from ringsim.refusal import InputError
 from ringsim.sampling.columns import BLOCK_ROW
 from ringsim.sampling.designs.blocks import Grouped, stretches
 from ringsim.sampling.designs.family import Design
 from ringsim.stepping.instant import Array
-from ringsim.tables import number_text
 from ringsim.variables import GOALS, Cause, Code, Fate, Status
 
 if TYPE_CHECKING:
@@ -352,33 +352,19 @@ def learnt_lines(campaign: xr.Dataset) -> list[str]:
     ]
 
 
-def law_text(says: Mapping[str, Any]) -> str:
-    """A distribution in words: its kind, and its parameters without those that place it.
-
-    >>> law_text({"kind": "uniform", "each_section": False, "low": 0.7, "high": 1.0})
-    'uniform, low 0.7, high 1'
-    >>> law_text({"kind": "truncated", "high": 5.0, "of": {"kind": "exponential", "mean": 2.0}})
-    'truncated, high 5, of (exponential, mean 2)'
-    """
-    own = {key: value for key, value in says.items() if key not in ("shared", "each_section")}
-    kind = str(own.pop("kind", own.pop("text", "")))
-
-    def told(value: Any) -> str:
-        if isinstance(value, Mapping):
-            return f"({law_text(value)})"
-        return number_text(value, 5) if isinstance(value, float) else show(value)
-
-    parts = (f"{key.replace('_', ' ')} {told(value)}" for key, value in own.items())
-    return ", ".join([kind, *parts])
-
-
-# The drawn inputs of a campaign as columns of numbers: by mean, quarter, place, and by word.
+# The drawn inputs of a campaign as columns of numbers: by mean, quarter, place, by word, and by how
+# far the two planes are apart.
 
 
 _MOST_WORDS = 12
 """Different words of an input up to which each is a column of its own."""
 _LEAST_QUARTERED = 8
 """Places of an input from which on each quarter of them has a mean of its own."""
+DIFFERENCE = "difference of "
+"""How the names of columns begin that tell how far inputs of the two planes are apart."""
+_LEAST_ARM = 0.1
+"""Share of the samples in which either plane has the larger value, below which there is no
+difference: a V of which one arm is shorter is a line, which the inputs tell one by one."""
 
 
 @dataclass(frozen=True)
@@ -388,9 +374,10 @@ class Drawn:
     names: tuple[str, ...]
     values: Array
     level: tuple[str, ...]
-    """Of each column: "input"; of one that has many places "mean", "quarter" and "place"."""
+    """Of each column: "input"; of one that has many places "mean", "quarter" and "place"; of both
+    planes' inputs "difference"."""
     input: tuple[str, ...]
-    """Of each column the name of its input."""
+    """Of each column the name of its input; of a difference its own."""
     span: tuple[tuple[int, int], ...]
     """Of each column the first of its places and the one behind the last; 0, 0 without places."""
 
@@ -399,6 +386,9 @@ def drawn(campaign: xr.Dataset) -> Drawn:
     """All drawn inputs by the names that the campaign's file gives them: one that several paths
     share is one column; inputs of other names that are alike in all samples are one, too, which has
     both names, since nothing tells them apart.
+
+    What both planes have adds its absolute difference, of many places that of their means: an
+    output that grows as the planes part goes with neither input alone.
     """
     found: dict[str, tuple[Array, str, str, tuple[int, int]]] = {}
     for variable in (campaign[name] for name in inputs(campaign)):
@@ -424,6 +414,8 @@ def drawn(campaign: xr.Dataset) -> Drawn:
                 found[name] = mean, "quarter", own, (low, high)
             for k, place in enumerate(place_names(variable)):
                 found[f"{place} of {own}"] = numbers[:, k], "place", own, (k, k + 1)
+    for name, (_, apart) in planes_apart(campaign).items():
+        found[name] = apart, "difference", name, (0, 0)
     kept: dict[bytes, tuple[list[str], Array, str, tuple[int, int], list[str]]] = {}
     for name, (column, level, own, span) in found.items():
         if np.ptp(column) > 0:
@@ -442,23 +434,35 @@ def drawn(campaign: xr.Dataset) -> Drawn:
     )  # fmt: skip
 
 
-def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) -> list[str]:
-    """Of columns, the strongest first, those that share no place with a stronger one.
-
-    ``places`` are the input of each, its first place and the one behind its last.
-
-    >>> places = {"mean": ("cable", 0, 8), "5 to 8": ("cable", 4, 8), "1": ("cable", 0, 1)}
-    >>> strongest(["5 to 8", "mean", "1"], places)
-    ['5 to 8', '1']
+def planes_apart(campaign: xr.Dataset) -> dict[str, tuple[xr.DataArray, Array]]:
+    """Absolute differences of the numbers drawn for the upper plane and for the lower one, whose
+    paths differ in these words alone, shape (samples,), of many places those of their means; each
+    with the upper variable, by a name as "difference of cables.upper/lower.winch.winding.speed".
     """
-    kept, taken = list[str](), dict[str, list[tuple[int, int]]]()
-    for name in names:
-        own, low, high = places.get(name, (name, 0, 0))
-        others = taken.setdefault(own, [])
-        if not any(max(low, first) < min(high, end) for first, end in others):
-            kept.append(name)
-            others.append((low, high))
-    return kept
+    variables = [campaign[name] for name in inputs(campaign) if campaign[name].dtype.kind in "fiu"]
+    by_paths = {tuple(paths_of(each)): each for each in variables}
+    found: dict[str, tuple[xr.DataArray, Array]] = {}
+    for paths, upper in by_paths.items():
+        lower = by_paths.get(tuple(_UPPER.sub("lower", path) for path in paths), upper)
+        alike = upper.dims == lower.dims and upper.attrs.get("units") == lower.attrs.get("units")
+        if lower is upper or not alike:
+            continue
+        high, low = (
+            each.to_numpy().astype(float).reshape(len(each), -1).mean(axis=1)
+            for each in (upper, lower)
+        )
+        # Where one never changes the difference is a V in the other alone, as its own index sees.
+        arm = min(np.mean(high > low), np.mean(high < low)) if np.ptp(high) and np.ptp(low) else 0
+        if arm >= _LEAST_ARM:
+            names = called(upper), called(lower)
+            both = _UPPER.sub("upper/lower", names[0])
+            both = both if _UPPER.sub("lower", names[0]) == names[1] else " and ".join(names)
+            name = f"{DIFFERENCE}{'the means of ' * (upper.ndim > 1)}{both}"
+            found[name] = upper, np.abs(high - low)
+    return found
+
+
+_UPPER = re.compile(r"(?<![a-z])upper(?![a-z])")
 
 
 def place_called(variable: xr.DataArray) -> str:

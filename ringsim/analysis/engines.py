@@ -249,6 +249,7 @@ OUTPUTS = {
     "peak_tension": "peak tension",
     "peak_rod_stress": "peak stress",
     "peak_bending_strain": "peak strain",
+    "peak_latch_rate": "peak latch rate",
 }
 """What people use of a result, as far as a scene has it, and its name in tables."""
 LEAST_ASYNCHRONY = 1e-3

@@ -1,6 +1,6 @@
 """What matters: which inputs go with an output, and which separate failures from successes."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from ringsim.analysis import indices
 from ringsim.analysis.design import (
+    DIFFERENCE,
     FAILED_RUNS,
     Drawn,
     Placement,
+    campaign_file,
     drawn,
     endings,
+    learnt_lines,
     short_of_goal,
-    strongest,
 )
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
 from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used, varies
@@ -92,9 +94,9 @@ def _apart(inputs: Drawn) -> NDArray[np.bool_]:
     return np.asarray((own[:, None] != own) | (place[:, None] & place))
 
 
-def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
-    """Variables along ``pair``: the names of both inputs and their correlation; none without a
-    pair.  ``used``, shape (samples,), are the samples that count.
+def confounded(inputs: Drawn, used: NDArray[np.bool_], cure: str) -> dict[str, Any]:
+    """Variables along ``pair``: the names of both inputs and their correlation, with its ``cure``;
+    none without a pair.  ``used``, shape (samples,), are the samples that count.
     """
     found = pairs(inputs.values[used], _apart(inputs))
     if not found:
@@ -106,7 +108,8 @@ def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
             names[[each.second for each in found]], {"long_name": "second input of the pair"},
         ),
         "correlation": (
-            [each.correlation for each in found], about("rank correlation of the two inputs"),
+            [each.correlation for each in found],
+            about("rank correlation of the two inputs") | {"cure": cure},
         ),
         "share": (
             [each.share for each in found],
@@ -114,6 +117,13 @@ def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
         ),
     }  # fmt: skip
     return {f"pair_{name}": ("pair", *each) for name, each in columns.items()}
+
+
+def _cure(campaign: xr.Dataset, placed: Placement) -> str:
+    """What parts inputs that go together in the samples, if anything does."""
+    if campaign_file(campaign).get("correlations") or learnt_lines(campaign):
+        return "they are drawn so (correlations, or a test), and more samples would not part them"
+    return "draw more samples" + ', or use design.kind = "random"' * (not placed.independent)
 
 
 def partners(analysis: xr.Dataset) -> dict[str, set[str]]:
@@ -127,7 +137,12 @@ def partners(analysis: xr.Dataset) -> dict[str, set[str]]:
 
 def confounding_notes(analysis: xr.Dataset, told: Collection[str]) -> list[str]:
     """Which inputs among those that are told go with others, and what that means."""
-    found = [each for each in _pairs_in(analysis) if not {each[0], each[1]}.isdisjoint(told)]
+    found = [
+        each for each in _pairs_in(analysis)
+        if not {*each[:2]}.isdisjoint(told)
+        # It goes with its own parts whatever the design is.
+        and not any(name.startswith(DIFFERENCE) for name in each[:2])
+    ]  # fmt: skip
     if not found:
         return []
     named = ", ".join(
@@ -138,8 +153,7 @@ def confounding_notes(analysis: xr.Dataset, told: Collection[str]) -> list[str]:
     return [
         "these inputs are correlated in the samples, more than by chance (share of the variance "
         f"of one that the other explains, rank correlation): {named}{more}, so that the effect "
-        "of one may be taken for that of the other: draw more samples, or use design.kind = "
-        '"random"'
+        f"of one may be taken for that of the other: {analysis['pair_correlation'].attrs['cure']}"
     ]
 
 
@@ -161,8 +175,9 @@ LEAST = 8
 """Samples below which there is no correlation to speak of."""
 _LEAST_GROUP = 3
 """Samples of a group, and of the rest, below which nothing separates them."""
-_LEVELS = ("place", "quarter", "mean")
-"""How an input of many places is represented; the last one decides about the other inputs."""
+_LEVELS = ("difference", "place", "quarter", "mean")
+"""How an input of many places, or of both planes, is represented; the last one decides about the
+other inputs."""
 
 
 def influence(
@@ -225,7 +240,7 @@ def influence(
         ("input", "bound"), np.array(inputs.span, dtype="i8"),
         about("first of its sections (pulleys, ...), and the one after the last"),
     )  # fmt: skip
-    found |= confounded(inputs, ok)
+    found |= confounded(inputs, ok, _cure(campaign, placed))
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
     if groups:
         coords["group"] = np.array([*groups], dtype=object)
@@ -248,6 +263,25 @@ def apart(
         ordered = sorted(names, key=lambda name: -plain.get(name, 0.0))
     kept = strongest(ordered, places)
     return [name for name in names if name in kept]
+
+
+def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) -> list[str]:
+    """Of columns, the strongest first, those that share no place with a stronger one.
+
+    ``places`` are the input of each, its first place and the one behind its last.
+
+    >>> places = {"mean": ("cable", 0, 8), "5 to 8": ("cable", 4, 8), "1": ("cable", 0, 1)}
+    >>> strongest(["5 to 8", "mean", "1"], places)
+    ['5 to 8', '1']
+    """
+    kept, taken = list[str](), dict[str, list[tuple[int, int]]]()
+    for name in names:
+        own, low, high = places.get(name, (name, 0, 0))
+        others = taken.setdefault(own, [])
+        if not any(max(low, first) < min(high, end) for first, end in others):
+            kept.append(name)
+            others.append((low, high))
+    return kept
 
 
 def separating(analysis: xr.Dataset, samples: int) -> Iterator[tuple[str, list[int]]]:
@@ -321,7 +355,6 @@ def _correlated(
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:  # fmt: skip
     """Plain and partial rank correlations, shape (input,), with intervals, shape (input, 2)."""
     level = np.array(inputs.level)
-    own = level == "input"
 
     def plain(rows: Any) -> Array:
         return indices.correlations(columns.ranks(rows), output[rows])
@@ -329,7 +362,7 @@ def _correlated(
     def partial(rows: Any) -> Array:
         found, x = np.full(len(level), np.nan), columns.ranks(rows)
         for each in (each for each in _LEVELS if (level == each).any() or each == "mean"):
-            held = own | (level == each)
+            held = _together(level, each)
             found[held] = indices.partial_correlations(x[:, held], output[rows])
         return found
 
@@ -351,10 +384,20 @@ def _correlated(
 
 def _held(level: NDArray[np.str_]) -> NDArray[np.int64]:
     """How many other inputs the partial correlation of each one holds, shape (input,)."""
-    found, own = np.zeros(len(level), dtype=np.int64), level == "input"
+    found = np.zeros(len(level), dtype=np.int64)
     for each in _LEVELS:
-        found[own | (level == each)] = (own | (level == each)).sum() - 1
+        held = _together(level, each)
+        found[held] = held.sum() - 1
     return found
+
+
+def _together(level: NDArray[np.str_], each: str) -> Mask:
+    """The columns of which a partial correlation takes one and holds the others: of one level, and
+    inputs of one place.  Differences are beside the means of their parts, but these without them,
+    which are half of their own effect.
+    """
+    beside = ("input", each, "mean") if each == "difference" else ("input", each)
+    return np.isin(level, beside)
 
 
 def groups_of(

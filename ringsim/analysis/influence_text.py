@@ -6,8 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.design import strongest
-from ringsim.analysis.indices import UNLIKELY
+from ringsim.analysis.design import DIFFERENCE
 from ringsim.analysis.influence import (
     RANKS,
     apart,
@@ -16,11 +15,13 @@ from ringsim.analysis.influence import (
     places_in,
     separating,
     standing_out,
+    strongest,
 )
 from ringsim.analysis.intervals import ALIKE, LEVEL, hardly_apart, is_moment, quantities
+from ringsim.analysis.sensitivity import refusals
 from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table, chance_text, counted, interval_text, number_text
+from ringsim.tables import Table, counted, interval_text, number_text
 
 # Every measure: the largest rank correlations, indices and areas of each output.
 
@@ -176,9 +177,6 @@ def _with_interval(middle: Array, ends: Array, k: int) -> tuple[str, str]:
 
 _MOST = 5
 """Groups or inputs that are told for each output."""
-_TELLING = 5
-"""Samples without a value from which on it is said that they depend on no input: four lie in the
-same half of an input by chance once in 8, five once in 16."""
 _MOST_PLACES = 3
 _SLACK = 0.05
 """How far Sobol' indices may lie above what is possible before that is told."""
@@ -250,38 +248,6 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...]) -> Table:
     return marked(Table([*head, f"{of} used", "left out"], rows, notes), analysis)
 
 
-def _gate(analysis: xr.Dataset) -> Iterator[str]:
-    """What became of outputs that samples lack: why there is no index, or why there is one."""
-    if "missing_by_inputs" not in analysis:
-        return
-    outputs: dict[tuple[int, int, float], list[str]] = {}
-    blocks = ", with the rest of their blocks," if "factor" in analysis.dims else ""
-    needed = ("output", "missing", "missing_lost", "missing_by_inputs")
-    columns = (analysis[name].values.tolist() for name in needed)
-    for output, count, failed, chance in zip(*columns, strict=True):
-        if count:
-            outputs.setdefault((count, failed, round(chance, 4)), []).append(output)
-    for (count, failed, chance), names in outputs.items():
-        who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
-        p = chance_text(chance)
-        if chance < UNLIKELY:
-            cures = ["set a requirement on the outcome instead"] * (failed < count)
-            if failed:  # what did not fail has no value because of what the antenna did
-                cures.append(
-                    f"run the {failed} failed ones again (ringsim campaign --retry-failed)"
-                )
-            yield (
-                f"no sensitivity index for {who}: whether a sample has a value depends on the "
-                f"inputs ({counted(count, 'sample')} without, {p}), so the rest is not "
-                f"representative: {', '.join(cures)}, or narrow the inputs"
-            )
-        else:
-            why = f"this does not seem to depend on any input ({p})"
-            if count < _TELLING:
-                why = "too few to tell whether that depends on an input"
-            yield f"{who}: {counted(count, 'sample')} without a value{blocks} left out; {why}"
-
-
 def sensitivity_tables(analysis: xr.Dataset) -> list[Table]:
     """Indices of outputs and failures, and what they leave out."""
     found = []
@@ -289,7 +255,7 @@ def sensitivity_tables(analysis: xr.Dataset) -> list[Table]:
         found.append(_told(analysis, names))
     if "second_order_index" in analysis:
         found.append(_second(analysis))
-    return found + refusals(analysis)
+    return found + refusals(analysis, every=True)
 
 
 def measure_notes(analysis: xr.Dataset) -> list[str]:
@@ -309,8 +275,8 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
         told = "; each word of an input counts by itself, so that these may add up to more than 1"
         return [
             "first-order index: share of the variance that one input alone explains, estimated "
-            "from bins of its values and corrected for chance; too small if the output is "
-            "strongly nonlinear within a bin" + told * words
+            "from bins of its values and corrected for chance, so that one of about 0 may be below "
+            "zero; too small if the output is strongly nonlinear within a bin" + told * words
         ]
     return []
 
@@ -348,12 +314,6 @@ def _farthest(values: Array) -> float:
     return float(known[np.argmax(np.abs(known - 0.5))]) if len(known) else np.nan
 
 
-def refusals(analysis: xr.Dataset) -> list[Table]:
-    """What became of outputs that samples lack, as notes."""
-    lines = list(_gate(analysis))
-    return [Table((), (), lines)] if lines else []
-
-
 def _second(analysis: xr.Dataset) -> Table:
     rows, factors = [], analysis["factor"].values
     for output in analysis["output"].values.tolist():
@@ -373,7 +333,6 @@ def _second(analysis: xr.Dataset) -> Table:
 
 _MOST_IN_SHORT = 3
 """Inputs that are told for each output."""
-"""Of rank correlations the one that holds the other inputs first, with their heads."""
 _CHANCE = {"given_data_index": "chance_level"}
 """Measures that chance lifts, and how far."""
 
@@ -385,7 +344,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
     measure = _measure(analysis)
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
-    rows, quiet, doubtful, more = [], [], list[str](), list[str]()
+    rows, quiet, doubtful, more, alone = [], [], list[str](), list[str](), list[str]()
     separated, flat = _separated_groups(analysis), _flat(analysis)
     for output, names, others in mattering(analysis):
         if is_moment(output) or output in flat:
@@ -397,17 +356,29 @@ def what_matters(analysis: xr.Dataset) -> Table:
             (output if k == 0 else "", *_row_of(analysis, output, name))
             for k, name in enumerate(names[:_MOST_IN_SHORT])
         ]
+        if measure in _CHANCE and output in _correlated(analysis):
+            sure = analysis["input"].values[_standing(analysis, output)]
+            alone += [f"{output} by {n}" for n in names[:_MOST_IN_SHORT] if n not in sure]
         if not names and output not in separated:
             quiet.append(output)
     notes = measure_notes(analysis)
+    if any(row[1].startswith(DIFFERENCE) for row in rows):
+        notes.append("difference: how far the planes' inputs are apart, whichever is the larger")
+    if alone:
+        notes.append(
+            f"listed by the index alone, without a significant rank correlation: {', '.join(alone)}"
+            ": an effect that rises and falls, or chance"
+        )
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         count = counted(analysis.sizes["input"], "input")
         twice = measure in _CHANCE and bool(_correlated(analysis))
         how = " by its index or its partial rank correlation" * twice
+        outputs, often = len(quiet) + sum(bool(row[0]) for row in rows), 10 if twice else 20
+        many = f", so up to {outputs / often:.2g} of these {outputs}" * (outputs >= often)
         notes.append(
-            f"by chance alone, fewer than one output in {10 if twice else 20} would have an input "
-            f"listed{how} ({count} in all, sections and means included); of a mean and its parts "
-            "only the strongest is listed"
+            f"by chance alone, fewer than one output in {often} would have an input listed{how}"
+            f"{many} ({count} in all, sections, means and differences included); of a mean and its "
+            "parts only the strongest is listed"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if more:
@@ -517,7 +488,7 @@ def _cleared(analysis: xr.Dataset, output: str, found: list[str]) -> tuple[list[
     if not paired or "factor" in analysis.dims or output not in _correlated(analysis):
         return found, []
     partial = analysis[f"{output}_partial_rank_correlation"].values
-    clear = np.isnan(partial) | standing_out(analysis, output, _samples(analysis, output))[1]
+    clear = np.isnan(partial) | _standing(analysis, output)
     stands = dict(zip(analysis["input"].values.tolist(), clear.tolist(), strict=True))
     kept, others = list[str](), list[str]()
     for name in found:
@@ -537,6 +508,10 @@ def _apart(analysis: xr.Dataset, output: str, found: list[str]) -> list[str]:
 
 def _correlated(analysis: xr.Dataset) -> list[str]:
     return [name for name in quantities() if f"{name}_rank_correlation" in analysis]
+
+
+def _standing(analysis: xr.Dataset, output: str) -> NDArray[np.bool_]:
+    return standing_out(analysis, output, _samples(analysis, output))[1]
 
 
 def _samples(analysis: xr.Dataset, output: str) -> int:

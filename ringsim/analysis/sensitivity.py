@@ -15,9 +15,10 @@ from ringsim.analysis import indices
 from ringsim.analysis.design import Blocks, Placement, blocks_of, drawn, population_of
 from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.influence import groups_of
-from ringsim.analysis.intervals import good, lost, numbers, quantities, ran, varies
+from ringsim.analysis.intervals import good, is_moment, lost, numbers, quantities, ran, varies
 from ringsim.analysis.requirements import Requirement
 from ringsim.stepping.instant import Array
+from ringsim.tables import Table, chance_text, counted
 from ringsim.variables import about
 
 _LEAST_OF_A_KIND = 10
@@ -219,3 +220,55 @@ def _dataset(
     if "second_order_index" in made and in_blocks:
         made = made.assign_coords(other_factor=np.array(coords["factor"], dtype=object))
     return made
+
+
+# What became of outputs that samples lack, in words.
+
+
+_TELLING = 5
+"""Samples without a value from which on it is said that they depend on no input: four lie in the
+same half of an input by chance once in 8, five once in 16."""
+_NAMED = 5
+"""Outputs that a line names at most."""
+
+
+def refusals(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
+    """What became of outputs that samples lack, as notes; of when peaks were only if ``every`` one
+    is told.
+    """
+    lines = list(_gate(analysis, every=every))
+    return [Table((), (), lines)] if lines else []
+
+
+def _gate(analysis: xr.Dataset, *, every: bool) -> Iterator[str]:
+    """What became of outputs that samples lack: why there is no index, or why there is one."""
+    if "missing_by_inputs" not in analysis:
+        return
+    outputs: dict[tuple[int, int, float], list[str]] = {}
+    blocks = ", with the rest of their blocks," if "factor" in analysis.dims else ""
+    needed = ("output", "missing", "missing_lost", "missing_by_inputs")
+    columns = (analysis[name].values.tolist() for name in needed)
+    for output, count, failed, chance in zip(*columns, strict=True):
+        if count and (every or not is_moment(output)):
+            outputs.setdefault((count, failed, round(chance, 4)), []).append(output)
+    for (count, failed, chance), names in outputs.items():
+        who = ", ".join(names[:_NAMED]) + (
+            f" and {len(names) - _NAMED} more" * (len(names) > _NAMED)
+        )
+        p = chance_text(chance)
+        if chance < UNLIKELY:
+            cures = ["set a requirement on the outcome instead"] * (failed < count)
+            if failed:  # what did not fail has no value because of what the antenna did
+                cures.append(
+                    f"run the {failed} failed ones again (ringsim campaign --retry-failed)"
+                )
+            yield (
+                f"no sensitivity index for {who}: whether a sample has a value depends on the "
+                f"inputs ({counted(count, 'sample')} without, {p}), so the rest is not "
+                f"representative: {', '.join(cures)}, or narrow the inputs"
+            )
+        else:
+            why = f"this does not seem to depend on any input ({p})"
+            if count < _TELLING:
+                why = "too few to tell whether that depends on an input"
+            yield f"{who}: {counted(count, 'sample')} without a value{blocks} left out; {why}"

@@ -445,7 +445,7 @@ class Evidence(Model):
         errors = [setting.errors.get(of, np.inf) for setting in settings]
         if min(errors) == np.inf:
             there = ", ".join(name for name in CHOICES if name in settings[0].errors)
-            raise InputError(f"--of {of}: {self.scene} has no such output: choose from {there}")
+            raise InputError(f"--of {of}: not measured with {self.scene}: choose from {there}")
         if min(errors) <= accuracy:
             return next(s for s, e in zip(settings, errors, strict=True) if e <= accuracy)
         best = float(f"{1.006 * min(errors):.2e}")  # rounded up, so that asking for it succeeds

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.design import FAILED_RUNS, law_text, placement, population_of
+from ringsim.analysis.design import FAILED_RUNS, placement, population_of
 from ringsim.analysis.influence_text import (
     FEW_DECIDE,
     influence_tables,
-    refusals,
     sensitivity_tables,
     what_matters,
     what_separates,
@@ -35,6 +34,7 @@ from ringsim.analysis.reweighting import (
     REWEIGHTED_STATISTICS,
     SOBOL,
 )
+from ringsim.analysis.sensitivity import refusals
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
@@ -49,8 +49,10 @@ from ringsim.analysis.worst import (
     worst_tables,
 )
 from ringsim.refusal import InputError
+from ringsim.sampling.distributions import law_text
 from ringsim.tables import (
     Table,
+    bound_text,
     counted,
     digits_of,
     estimate_text,
@@ -331,15 +333,14 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             so_far = f"{bad} of {used} violate it so far; " * bool(bad)
             notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
         if bad and verdict != Verdict.NO_POPULATION:
-            share, low, high = (
-                number_text(1.0 - one[f"probability{end}"]) for end in ("", "_upper", "_lower")
-            )
+            low = bound_text(1.0 - one["probability_upper"], upper=False)
+            high = bound_text(1.0 - one["probability_lower"], upper=True)
             notes.append(
-                f"{name}: violated with a probability of {share} ({low} .. {high}, each bound with "
-                "the confidence required)"
+                f"{name}: violated with a probability of {number_text(1.0 - one['probability'])} "
+                f"({low} .. {high}, each bound with the confidence required)"
             )
         elif not bad and used and np.isfinite(one["probability_lower"]):
-            most = number_text(1.0 - one["probability_lower"], 2)
+            most = bound_text(1.0 - one["probability_lower"], 3, upper=True)
             never.setdefault((most, f"{one['confidence_required']:g}"), []).append(str(name))
         if verdict != alone:
             notes.append(
@@ -387,12 +388,12 @@ _CHOSEN = "these samples stand for no population: there is no probability to est
 
 def _decisive(verdict: Verdict, low: float, high: float) -> str:
     """The bound of a probability that decides a verdict; both where neither does."""
+    least, most = bound_text(low, upper=False), bound_text(high, upper=True)
     if verdict is Verdict.MET:
-        return f"at least {number_text(low)}"
+        return f"at least {least}"
     if verdict is Verdict.NOT_MET:
-        return f"at most {number_text(high)}"
-    known = np.isfinite([low, high]).all()
-    return f"at least {number_text(low)}, at most {number_text(high)}" if known else "-"
+        return f"at most {most}"
+    return f"at least {least}, at most {most}" if np.isfinite([low, high]).all() else "-"
 
 
 def outcome_table(analysis: xr.Dataset) -> Table:

@@ -19,7 +19,7 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.sampling.designs.levels import Repetition, SubsetSimulation
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table, chance_text, with_unit
+from ringsim.tables import Table, bound_text, chance_text, with_unit
 from ringsim.variables import Status, about
 
 DISAGREE = 0.01
@@ -248,14 +248,14 @@ def short_of(found: xr.Dataset) -> list[str]:
         return [f"unknown: {none} of {len(each)} replicates have too few runs with a value"]
     reached, nearest = found["tail_reached_probability"], found["tail_nearest"]
     low, high = found["tail_reached_probability_interval"].to_numpy()
-    short = int((each == 0.0).sum())
-    words = [f"below {high:.2g}: {short} of {len(each)} replicates did not reach the event"]
+    most, short = bound_text(high, 2, upper=True), int((each == 0.0).sum())
+    words = [f"below {most}: {short} of {len(each)} replicates did not reach the event"]
     if short < len(each):
         words.append(f"their mean is {each.mean():.2g}")
     return [
         *words,
         f"the bound is the probability of {reached.attrs['event']}, which all replicates "
-        f"reached: {float(reached):.3g} (95 % {low:.2g} .. {high:.2g})",
+        f"reached: {float(reached):.3g} (95 % {bound_text(low, 2, upper=False)} .. {most})",
         "the run nearest to the event has "
         f"{with_unit(f'{float(nearest):.6g}', nearest.attrs['units'])}",
     ]
@@ -275,8 +275,8 @@ def unseen_lines(found: xr.Dataset) -> list[str]:
         )
     lines.append(
         "these numbers leave out any part of the event that no chain has found; the first "
-        f"{samples} samples, which are independent, give an upper bound of {most:.2g} (97.5 %) "
-        "for the whole event"
+        f"{samples} samples, which are independent, give an upper bound of "
+        f"{bound_text(most, 2, upper=True)} (97.5 %) for the whole event"
     )
     return lines
 

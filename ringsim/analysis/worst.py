@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.design import (
+    DIFFERENCE,
     FAILED_RUNS,
     LOST,
     blocks_of,
@@ -21,6 +22,7 @@ from ringsim.analysis.design import (
     paths_of,
     place_names,
     placement,
+    planes_apart,
     short_of_goal,
 )
 from ringsim.analysis.indices import UNLIKELY, dependence
@@ -29,6 +31,7 @@ from ringsim.analysis.intervals import ROUND_OFF, Mask, good, lost, numbers, qua
 from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
+from ringsim.outputs.balance import exceeded
 from ringsim.overrides import flat
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, chance_text, counted, number_text, readable, with_unit
@@ -77,7 +80,8 @@ def unusual(
     ``drawn`` that separate its failure, the best first, and whether they are larger there.
 
     Of an input with m places the one that is farthest out among all values counts, with m times
-    the share: some place of every sample is far out by chance.  Its mean counts beside.
+    the share: some place of every sample is far out by chance.  Its mean counts beside, and large
+    differences of the two planes' inputs.
 
     Of a design that changes one input at a time what is other than in its base case.
     """
@@ -85,27 +89,33 @@ def unusual(
         return [other_than_base(campaign, place) for place in places]
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     variables = {k: v for k, v in variables.items() if v.attrs.get("path") != "solver.error_bars"}
-    columns, found = drawn(campaign), list[str]()
+    columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
     for place, sides in zip(places, separating or [{}] * len(places), strict=True):
         told, named = list[str](), set[str]()
         for name, larger in sides.items():
             if name not in columns.names or len(told) == _MOST:
                 continue
             k = columns.names.index(name)
-            values, variable = columns.values[:, k], variables[columns.input[k]]
+            values, own = columns.values[:, k], columns.input[k]
+            variable = both[own][0] if own in both else variables[own]
             value = values[place] if larger else -values[place]
             out = float(np.mean((values if larger else -values) >= value))
-            if variable.name in named or out > (1.0 if _has_words(variable) else _SIDE):
+            if own in named or out > (1.0 if _has_words(variable) else _SIDE):
                 continue
-            named.add(str(variable.name))
+            named.add(own)
             told.append(
                 _word(variable, place)[1] if _has_words(variable)
                 else _told(name, values, float(values[place]), _units(variable))
             )  # fmt: skip
         odd = [
-            each for variable in variables.values() if variable.name not in named
+            each for own, variable in variables.items() if own not in named
             for each in _odd(variable, place)
         ]  # fmt: skip
+        for name in (each for each in both if each in columns.names and each not in named):
+            values = columns.values[:, columns.names.index(name)]
+            if (share := float(np.mean(values >= values[place]))) <= RARE:
+                words = _told(name, values, float(values[place]), _units(both[name][0]))
+                odd.append(_Oddity(share, words))
         told += [each.words for each in sorted(odd, key=lambda each: (not each.before, each.share))]
         found.append("; ".join(told[:_MOST]) or "nothing unusual")
     return found
@@ -191,7 +201,7 @@ def _told(name: str, rows: Array, value: float, units: str) -> str:
     """A value among those of all samples."""
     middle = float(np.median(rows))
     end = {rows.min(): ", the lowest", rows.max(): ", the highest"}.get(value, "")
-    if units == "K":
+    if units == "K" and not name.startswith(DIFFERENCE):
         word = "cold" if value < middle else "hot"
         return f"{name} {value:.4g} K ({value - _ZERO:+.0f} C, {word}{end})"
     if rows.min() > 0.0 or rows.max() < 0.0:
@@ -400,12 +410,13 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
 
     ``limit_text`` (as "limits.tension = 80 N"), ``limit_output``, ``limit_margin`` (limit over the
     largest value, less 1), ``limit_value`` and ``limit_sample``; a limit holds for the whole run,
-    so that values behind the last lock count, too.  Behind these the drive margin of scenes with
-    one, which is one already.  Empty without any.
+    so that values behind the last lock count, too: ``limit_of`` says so where one is larger than
+    the peak, ``limit_output``.  Behind these the drive margin of scenes with one, which is one
+    already.  Empty without any.
     """
     scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
     own = {path: name for name in inputs(campaign) for path in paths_of(campaign[name])}
-    rows = list[tuple[str, str, float, float, int]]()
+    rows = list[tuple[str, str, str, float, float, int]]()
     for limit, peak, series in _limited():
         path = f"limits.{limit}"
         if peak not in campaign or (path not in scene and path not in own):
@@ -418,17 +429,20 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         k, units = int(np.nanargmin(ratio)), quantities()[peak].units
         bound = float(np.broadcast_to(allowed, ratio.shape)[k])
         told = f"{path} = {with_unit(f'{bound:g}', units)}"
-        rows.append((told, peak, float(ratio[k]), float(values[k]), k))
+        later = series and exceeded(numbers(campaign, peak)[k], values[k])
+        of = f"{series} after the last lock, as recorded" if later else peak
+        rows.append((told, peak, of, float(ratio[k]), float(values[k]), k))
     least = np.where(good(campaign), numbers(campaign, _DRIVE), np.nan)
     if np.isfinite(least).any():
         k = int(np.nanargmin(least))
-        rows.append((f"{_DRIVE} >= 0", _DRIVE, float(least[k]), float(least[k]), k))
+        rows.append((f"{_DRIVE} >= 0", _DRIVE, _DRIVE, float(least[k]), float(least[k]), k))
     if not rows:
         return xr.Dataset()
-    texts, names, margin, value, places = zip(*rows, strict=True)
+    texts, names, told_of, margin, value, places = zip(*rows, strict=True)
     columns = {
         "text": (np.array(texts, dtype=object), {"long_name": "limit of the scene"}),
         "output": (np.array(names, dtype=object), {"long_name": "output that it bounds"}),
+        "of": (np.array(told_of, dtype=object), {"long_name": "what has the worst value"}),
         "margin": (np.array(margin), about("limit over the worst value, less 1; drive margin")),
         "value": (np.array(value), about("worst value of all samples, in the output's unit")),
         "sample": (campaign["sample"].to_numpy()[[*places]], about("sample with that value")),
@@ -464,12 +478,12 @@ def margin_table(analysis: xr.Dataset) -> Table:
         return Table((), ())
     rows = []
     columns = (analysis[f"limit_{word}"].values.tolist()
-               for word in ("text", "output", "margin", "value", "sample"))  # fmt: skip
-    for told, name, margin, value, sample in zip(*columns, strict=True):
+               for word in ("text", "output", "of", "margin", "value", "sample"))  # fmt: skip
+    for told, name, of, margin, value, sample in zip(*columns, strict=True):
         factor, units = readable(quantities()[name].units, value)
         worst = with_unit(number_text(factor * value), units)
         short = "" if margin >= 0.0 else ": NOT enough"
-        rows.append((told, name, worst, f"{margin:+.3g}{short}", str(sample)))
+        rows.append((told, of, worst, f"{margin:+.3g}{short}", str(sample)))
     notes = [
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"

@@ -1,7 +1,7 @@
 """Which values make an antenna best under what is uncertain: designs that are run as campaigns."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -387,11 +387,13 @@ class _Course:
             _write(self)
 
 
-def run_optimisation(given: Any, workers: int | None, out: Path | None) -> tuple[Ended, Path]:
+def run_optimisation(
+    given: Callable[[], Given], workers: int | None, out: Path | None
+) -> tuple[Ended, Path]:
     """Run all campaigns that are missing, on all ranks of an MPI world or with so many workers, and
     write what was found into the folder ``out`` (runs/NAME).  How it ended, and the file.
 
-    ``given`` is a function that returns the ``Given``, called on rank 0.  The same call goes on
+    ``given`` is called on rank 0.  The same call goes on
     with one that was interrupted, to the same result.
     """
     courses = list[_Course]()

@@ -29,7 +29,7 @@ from ringsim.dataset import save
 from ringsim.files import MERGED, require_file, require_place, writing
 from ringsim.refusal import EXIT_DONE, EXIT_NOT_MET, InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
-from ringsim.tables import counted, slim
+from ringsim.tables import counted, size_text, slim
 
 
 def opened(path: Path) -> xr.Dataset:
@@ -412,7 +412,7 @@ def export_command(
     out: Path | None,
 ) -> None:  # fmt: skip
     """Write a run, or a campaign, from its FILE or folder in the formats of other programs."""
-    from ringsim.export import MANY, most_rows, write_csv, write_mat, write_pvd
+    from ringsim.export import LARGE, size_of_csv, write_csv, write_mat, write_pvd
 
     with opened(file) as dataset:
         campaign = "sample" in dataset.dims
@@ -435,9 +435,9 @@ def export_command(
         chosen = chosen.drop_dims(["state_entry", "state_time"], errors="ignore")
         if names:
             chosen = _only(chosen, names, formats)
-        if "csv" in formats and (rows := most_rows(chosen)) > MANY:
+        if "csv" in formats and (size := size_of_csv(chosen)) > LARGE:
             click.echo(
-                f"the longest table has up to {rows:,} rows: choose variables with --variables, or "
+                f"writing about {size_text(size)} of CSV: choose variables with --variables, or "
                 "samples with --sample, unless you need all",
                 err=True,
             )

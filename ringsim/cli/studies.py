@@ -222,11 +222,18 @@ def optimise_command(
     import xarray as xr
 
     from ringsim.analysis.optimum import front_tables
-    from ringsim.campaign.optimisation import optimisation_of, run_optimisation
+    from ringsim.campaign.optimisation import Given, optimisation_of, run_optimisation
 
-    ended, path = run_optimisation(
-        lambda: optimisation_of(read_text(file), file, settings), _most(workers), out
-    )
+    def given() -> Given:
+        found = optimisation_of(read_text(file), file, settings)
+        budget = found.budget
+        click.echo(
+            f"{found.table['name']}: up to {budget.designs} designs of {budget.samples} samples, one "
+            f"after the other, then verdicts of {budget.verdict} samples; what has run is kept"
+        )
+        return found
+
+    ended, path = run_optimisation(given, _most(workers), out)
     if ended.refused is not None:
         if ended.first:
             raise ended.refused
@@ -255,14 +262,18 @@ def _course(
 ) -> int:  # fmt: skip
     import xarray as xr
 
-    from ringsim.campaign.calibration import calibration_of, run_course
+    from ringsim.campaign.calibration import Given, calibration_of, run_course
 
-    ended, path = run_course(
-        lambda: calibration_of(read_text(file), file, settings),
-        _most(workers),
-        out,
-        planning=planning,
-    )
+    def given() -> Given:  # where stages are ordered: on the first rank
+        found = calibration_of(read_text(file), file, settings)
+        stages, each = found.budget.stages, found.members
+        click.echo(
+            f"{found.campaign.specification.name}: {counted(stages * each, 'run')} in "
+            f"{counted(stages, 'stage')} of {each}, one after the other; what has run is kept"
+        )
+        return found
+
+    ended, path = run_course(given, _most(workers), out, planning=planning)
     if ended.refused is not None:
         if ended.first:
             raise ended.refused

@@ -109,6 +109,10 @@ def instead_of(name: str, *senses: str) -> str:
 # The main numbers of a run in words.
 
 
+_IF_ANY = ("longest_slack",)
+"""Numbers that are told if they are above zero only."""
+
+
 def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
     """What is told of each main number that is known, by variable: how much, when and where."""
     found = {}
@@ -117,7 +121,7 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             if variable.summary is None:
                 continue
             number = np.asarray(values.get(variable.name, np.nan)).item()
-            if not np.isfinite(number):
+            if not np.isfinite(number) or (not number and variable.name in _IF_ANY):
                 continue
             # Whole numbers of which some are missing come as floats out of files.
             number = int(number) if variable.dtype.startswith("i") else number
@@ -129,8 +133,19 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             text = f"{text} {unit_text(unit)}".rstrip()
             if np.isfinite(bar):  # samples of a campaign need not have one
                 text += f" +- {bar:.2g}"
-            found[variable.name] = f"{text} {output().told(values, span_names)}".rstrip()
+            text = f"{text} {output().told(values, span_names)}".rstrip()
+            series = values.get(variable.largest_of, ()) if output.limit else ()
+            # A limit holds for the whole run, a peak may count up to the last lock. By how much it
+            # is larger the series does not say: what ends a run counts all steps.
+            if np.size(series) and exceeded(number, factor * float(np.nanmax(series))):
+                text += "; more than that after the last lock"
+            found[variable.name] = text
     return found
+
+
+def exceeded(peak: float, later: float) -> bool:
+    """Whether a series is larger than its peak: not by the digits alone that files leave it."""
+    return later > peak * (1.0 + 1e-6)
 
 
 # Numerical error of a run, estimated from a second run with half the steps and twice the elements.

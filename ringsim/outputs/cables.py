@@ -1,6 +1,7 @@
 """The cables: tensions of spans, slack, pulleys' ratios, lengths."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ringsim.outputs.family import (
     Reading,
     Run,
     Series,
+    SpanNames,
     Values,
     Variable,
 )
@@ -150,7 +152,7 @@ class LongestSlack(Output):
         Variable(
             "longest_slack", (), "s",
             "longest time for which a span was slack without a break, until its plane has locked",
-            worse="larger",
+            summary=("longest slack", "10.3g"), worse="larger",
         ),
         *PEAK_OF_SLACK.variables,
     )  # fmt: skip
@@ -176,6 +178,10 @@ class LongestSlack(Output):
         if not np.nanmax(longest) > 0.0:
             return {"longest_slack": 0.0}
         return {"longest_slack": np.nanmax(longest)} | PEAK_OF_SLACK.at(run, begun, longest)
+
+    def told(self, values: Values, span_names: SpanNames) -> str:
+        """From when on, and where."""
+        return re.sub(r"^at (\S+ s)", r"from \1 on", super().told(values, span_names))
 
 
 def longest_above(times: Array, values: Array, until: Array) -> tuple[Array, Array]:

@@ -23,6 +23,11 @@ _SOURCES = (
 _HATCHES = ("", "//", "..", "\\\\", "xx", "--", "oo")
 
 
+_FACTORED = (
+    "with the factors of the standard and the pulleys' loss, which ringsim check --margin lists"
+)
+
+
 @picture("run", 110, "Drive and resistance", ("drive_margin", "opening_angle"))
 def drive(dataset: xr.Dataset) -> Figure:
     """``drive_available``, ``drive_resistance`` and ``drive_margin`` (time) of a run, and
@@ -66,7 +71,9 @@ def drive(dataset: xr.Dataset) -> Figure:
         told = [f"least margin {least:.3f} at {where:.0f} deg"]
     if (known["time"] >= stopped).any():
         told.append(f"no margin from {stopped:.4g} s on: all winches have stopped")
-    lower.set_title("; ".join(told), fontsize=9.5)  # inside it would lie on the curve
+    words = "; ".join(told)  # inside it would lie on the curve
+    # Above are the forces as computed: a drive far beyond all that resists would seem to have one.
+    lower.set_title(f"{words}\n{_FACTORED}" if np.isfinite(margin).any() else words, fontsize=9.5)
     style.margin_axis(lower, margin, f"Margin by {standard_of(dataset)}")
     lower.set_xlabel("Mean opening angle (deg)")
     style.head(figure, upper, dataset, "Drive and resistance")

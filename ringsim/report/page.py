@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,6 +28,7 @@ from ringsim.analysis.worst import note_on_unusual, worst_tables
 from ringsim.files import write_text
 from ringsim.measured import Measurement
 from ringsim.overrides import flat
+from ringsim.plots import style
 from ringsim.plots.comparison import figures_of_both, measured_and_computed
 from ringsim.plots.figures import figures_of
 from ringsim.refusal import show
@@ -61,8 +63,8 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
     drawn = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
     text = builtin_scenes().get(str(wanted.get("scene", "")), "")
     written, comments = flat(tomllib.loads(text)), _comments(text)
-    rows = []
-    for path, value in flat(tomllib.loads(str(campaign.attrs["scene"]))).items():
+    rows, own = [], flat(tomllib.loads(str(campaign.attrs["scene"])))
+    for path, value in own.items():
         comment, origin = comments.get(path, ""), "scene"
         if _under(path, drawn):
             origin = "drawn"
@@ -74,12 +76,24 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
             origin = "inferred"
         elif text and path not in written:
             origin = "default"
-        rows.append(Value(path, show(value), origin, comment))
+        rows.append(Value(path, show(value), origin, comment or _remark(path, own)))
     known = [row.path for row in rows]
     unset = [path for path in drawn if not _under(path, known) and not _holds(path, known)]
     rows += [Value(path, "-", "drawn", "") for path in unset]
     head = re.match(r"(?:#.*\n)+", text)
     return rows, " ".join(re.sub(r"^# ?", "", head[0], flags=re.MULTILINE).split()) if head else ""
+
+
+def _remark(path: str, scene: Mapping[str, Any]) -> str:
+    """What a value is not seen to be from its path alone."""
+    if path == "structure.polygon_sections" and scene.get("structure.closed"):
+        return "without effect: a closed ring is its own polygon"
+    return "per rod half" if path == "rods.elements" else ""
+
+
+def _title_of_scene(campaign: xr.Dataset) -> str:
+    title = tomllib.loads(str(campaign.attrs["scene"])).get("title", "")
+    return style.scene_title(campaign.assign_attrs(title=title)) if title else ""
 
 
 def _under(path: str, others: Any) -> bool:
@@ -157,6 +171,7 @@ def page(
         "not_run": int((endings(campaign) == "not run").sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
+        "scene_title": _title_of_scene(campaign),
         "told": told, "notes_on_all": head_lines(analysis)[1:],
         "names": {name: campaign[name].attrs.get("long_name", "") for name in outputs_in(analysis)
                   if name in campaign},

@@ -16,10 +16,10 @@ from ringsim.analysis.design import (
     distribution_of,
     endings,
     inputs,
-    law_text,
     paths_of,
 )
 from ringsim.analysis.worst import first_clause
+from ringsim.sampling.distributions import law_text
 from ringsim.tables import number_text, unit_text
 from ringsim.variables import Cause
 

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -15,6 +15,7 @@ from ringsim.choice import OneOf
 from ringsim.overrides import section_of
 from ringsim.refusal import show
 from ringsim.scene import Scene
+from ringsim.tables import number_text
 from ringsim.units import ListIn, Model
 
 # Values of inputs: numbers, words, whole tables and lists of them, in arrays and in words.
@@ -465,3 +466,32 @@ class Uniform(Continuous):
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
         return float(np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0))
+
+
+def law_text(says: Mapping[str, Any]) -> str:
+    """A distribution in words: its kind, and its parameters without those that place it.
+
+    >>> law_text({"kind": "uniform", "each_section": False, "low": 0.7, "high": 1.0})
+    'uniform, low 0.7, high 1'
+    >>> law_text({"kind": "truncated", "high": 5.0, "of": {"kind": "exponential", "mean": 2.0}})
+    'truncated, high 5, of (exponential, mean 2)'
+    >>> law_text({"kind": "calibrated", "of": {"kind": "normal", "mean": 2.0,
+    ...           "standard_deviation": 1.0}, "shift": 0.5, "remaining_scatter": 0.1, "data": "A"})
+    'median 2.5, 90 % in 2.336 .. 2.664 after A (before: normal, mean 2, standard deviation 1)'
+    """
+    own = {key: value for key, value in says.items() if key not in ("shared", "each_section")}
+    if own.get("kind") == "calibrated":  # its numbers are those of a standard normal variable
+        low, median, high = Calibrated.model_validate(own).quantile(np.array([0.05, 0.5, 0.95]))
+        return (
+            f"median {number_text(median)}, 90 % in {number_text(low)} .. {number_text(high)} "
+            f"after {own.get('data') or 'a test'} (before: {law_text(own['of'])})"
+        )
+    kind = str(own.pop("kind", own.pop("text", "")))
+
+    def told(value: Any) -> str:
+        if isinstance(value, Mapping):
+            return f"({law_text(value)})"
+        return number_text(value, 5) if isinstance(value, float) else show(value)
+
+    parts = (f"{key.replace('_', ' ')} {told(value)}" for key, value in own.items())
+    return ", ".join([kind, *parts])

@@ -71,7 +71,7 @@ def test_the_full_engine_runs_where_the_cheaper_one_cannot_or_may_not(
     [
         (["--accuracy", "1e-7"], "the best setting measured with ring18 has an error of"),
         (["--accuracy", "0.05", "--of", "mass"], "--of mass: must be one of motion, loads"),
-        (["--accuracy", "0.05", "--of", "peak_tension"], "ring18 has no such output"),
+        (["--accuracy", "0.05", "--of", "peak_tension"], "not measured with ring18: choose"),
         (["--of", "loads"], "without --accuracy"),
         (["--accuracy", "0.05", "--set", "solver.step_control=constant"], "step_control"),
         (["--accuracy", "0.05", "--fidelity", "both"], "leave out one"),

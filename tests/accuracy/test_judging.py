@@ -51,6 +51,7 @@ def made_up(rungs: list[Rung] = RUNGS) -> xr.Dataset:
                 "asynchrony": np.where(known, times * (1.0 + error), np.nan),
                 "asynchrony_max": TRUE_TIME * (1.0 + error),
                 "peak_rod_stress": TRUE_STRESS * (1.0 - error),
+                "peak_latch_rate": 0.5 * (1.0 + error),
                 "energy_error": error,
                 "cpu_time": scatter * float(rung.values["rods.elements"]) / np.sqrt(of_method),
                 "steps": 100.0 / np.sqrt(of_method),
@@ -82,7 +83,7 @@ def study() -> xr.Dataset:
 def test_the_extrapolated_reference_is_the_truth(study: xr.Dataset) -> None:
     """Both errors are of second order, so Richardson's extrapolation leaves nothing."""
     expected = [sum(errors_of(dict(rung.values))) for rung in RUNGS]
-    for output in ("deployment_time", "peak_rod_stress"):
+    for output in ("deployment_time", "peak_rod_stress", "peak_latch_rate"):
         np.testing.assert_allclose(study.error.sel(output=output), expected, rtol=1e-3, atol=1e-9)
     # Its uncertainty is the size of its correction: the errors of the finest steps and elements.
     in_time, in_space = references(RUNGS)
@@ -171,6 +172,15 @@ def test_tables_name_settings_as_overrides(study: xr.Dataset) -> None:
     assert in_words(study, 0) == "as it stands"
 
 
+def test_where_no_setting_is_good_enough_the_best_one_is_told(study: xr.Dataset) -> None:
+    """Every error five times as large as it is, of a reference that is known as well as before."""
+    worse = study.assign(bound=5.0 * study.bound, cheapest=0 * study.cheapest - 1)
+    least = 5.0 * float(study.bound.sel(output="deployment_time")[study.eligible].min())
+    (row,) = (line for line in tables(worse, "A study").splitlines()
+              if line.startswith("| deployment time | ") and "none tried" in line)  # fmt: skip
+    assert f"none tried: {least:.2g} at best" in row
+
+
 def test_a_terminal_has_the_same_tables_without_marks_of_markdown(study: xr.Dataset) -> None:
     told, text = "\n".join(lines(study, "A study")), tables(study, "A study")
     assert told.startswith("A study\n\nThe cheapest setting for each error.")
@@ -216,7 +226,7 @@ def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tm
         evidence.pick(0.5 * best)
     # What the refusal says to ask for is given.
     evidence.pick(float(str(told.value).partition("an error of ")[2].split()[0]))
-    with pytest.raises(InputError, match="has no such output: choose from motion, loads"):
+    with pytest.raises(InputError, match=r"not measured with .*: choose from motion, loads"):
         evidence.pick(0.1, "peak_tension")
     with pytest.raises(InputError, match="cables = False"):
         evidence.require_like(load_scene("ring18-cable"))

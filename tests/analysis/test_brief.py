@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.stats import beta
 
 from made import drawn_campaign
 from ringsim.analysis.influence import apart
@@ -234,6 +237,27 @@ def test_a_probability_is_bounded_where_no_sample_violates():
         "no sample violates asynchrony_max: the probability of a violation is at most 0.056 "
         "(confidence 0.9)"
     ) in told(analyse(made, wanted))
+
+
+@pytest.mark.parametrize("bad", [0, 3])
+def test_printed_bounds_hold_as_surely_as_the_computed_ones(bad):
+    """Clopper and Pearson's quantiles of the beta distribution; of 12 samples without a violation
+    1 - 0.1^(1/12) = 0.1746, which 0.17 would not bound.
+    """
+    made = drawn_campaign(RandomDesign(samples=12), linear, 2, 4)
+    most = np.sort(made.asynchrony_max.to_numpy())[-1 - bad]
+    wanted = {"asynchrony_max": {"max": most, "probability": 0.85, "confidence": 0.9}}
+    lines = told(analyse(made, wanted))
+    low = beta.ppf(0.1, 12 - bad, bad + 1)
+    high = beta.ppf(0.9, 12 - bad + 1, bad) if bad else 1.0
+    (row,) = (line for line in lines if line.startswith("asynchrony_max <= "))
+    least, other = (float(found) for found in re.findall(r"at (?:least|most) ([\d.]+)", row))
+    assert low - 1e-4 < least <= low
+    assert high <= other < high + 1e-4
+    (line,) = (line for line in lines if "a probability" in line or "the probability" in line)
+    ends = [float(found) for found in re.findall(r"0\.\d+", line.partition("(conf")[0])]
+    assert 1.0 - low <= ends[-1] < 1.0 - low + 1e-3
+    assert not bad or 1.0 - high - 1e-4 < ends[1] <= 1.0 - high
 
 
 def test_differences_of_rounding_are_told_as_zero_and_narrow_ranges_with_all_their_digits():

@@ -213,13 +213,30 @@ def test_a_verdict_that_changes_is_told():
     assert row.split()[-2:] == ["met", "met"]
 
 
+def test_verdicts_on_requirements_whose_limits_differ_are_told():
+    """No sample of 200 is above the second limit, and all are above the first."""
+    share = {"probability": 0.9, "confidence": 0.9}
+    one, two = (
+        seeded(2.0 + VALUES / VALUES.max()).assign_attrs(
+            requirements=json.dumps({"asynchrony_max": {"max": most} | share})
+        )
+        for most in (1.0, 5.0)
+    )
+    lines = compared(compare(one, two))
+    told = "asynchrony_max <= 1 deg: not met -> asynchrony_max <= 5 deg: met"
+    assert f"limits differ: {told}" in lines
+    assert not any("limits differ" in line for line in compared(compare(one, one)))
+
+
 @pytest.mark.parametrize(
     ("other", "words"),
     [
         (VALUES**3, ""),
         (9.0 - VALUES, "turn round"),
         (np.random.default_rng(3).random(COUNT), "hardly go together"),
+        (-0.5 * VALUES + 2.0 * np.random.default_rng(4).random(COUNT), "tend to turn round"),
         (5.0 + 1e-4 * VALUES, ""),  # all the same to the digits that are told
+        (5.0 - 1e-2 * VALUES, ""),  # they turn round by 0.2 %
     ],
 )
 def test_the_ranks_of_pairs_are_told_to_turn_round(other, words):

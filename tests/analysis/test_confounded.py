@@ -91,3 +91,18 @@ def test_a_mean_and_its_places_are_no_pair():
         "pulley 4 of friction",
         "pulleys 1 to 4 of friction",
     }
+
+
+def test_the_cure_is_of_the_design_and_none_parts_what_is_drawn_so():
+    """x1 and x2 are alike but for a tenth of noise, whatever has drawn them."""
+
+    def cure(design, text=""):
+        made = drawn_campaign(design, lambda x: x[:, 0], 3, 1).assign_attrs(campaign=text)
+        made["x2"][:] = made["x1"] + 0.1 * made["x2"]
+        (note,) = (n for n in what_matters(analyse(made)).notes if n.startswith("these inputs are"))
+        return note.rpartition(": ")[2]
+
+    assert cure(Sobol(samples=64)) == 'draw more samples, or use design.kind = "random"'
+    assert cure(RandomDesign(samples=64)) == "draw more samples"
+    text = '[[correlations]]\nbetween = ["x1", "x2"]\ncoefficient = 0.99\n'
+    assert cure(RandomDesign(samples=64), text).startswith("they are drawn so")

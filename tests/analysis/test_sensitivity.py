@@ -433,3 +433,15 @@ def test_runs_are_to_be_mended_only_if_they_failed() -> None:
         )
         assert words in line
         assert ("--retry-failed" in line) == (status == Status.TIMEOUT)
+
+
+def test_no_cure_is_told_for_the_time_of_what_did_not_happen() -> None:
+    """Samples without slack have no time of it, as one wants it; at length it is told."""
+    x = np.random.default_rng(4).random((60, 1))
+    slack = x[:, 0] > 0.6
+    made = campaign(x[:, 0], longest_slack_time=np.where(slack, 2.0 + x[:, 0], np.nan))
+    made["x1"] = "sample", x[:, 0], {"role": "input", "path": "x1", "distribution": UNIT}
+    found = analyse(made)
+    words = "no sensitivity index for longest_slack_time"
+    assert not any(words in line for line in told(found))
+    assert any(words in line for line in told(found, full=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 import subprocess
@@ -16,6 +17,7 @@ from loops import for_each
 from pages import PAGES, ROOT, blocks, calls
 from ringsim.cli import VERBS, cli, command_of
 from ringsim.plots import figures
+from ringsim.scene import load_scene
 
 WISHES = (ROOT / "docs" / "i_want_to.md").read_text(encoding="utf-8")
 EVIDENCE = [page for page in PAGES if "evidence" in page.parts and page.stem != "index"]
@@ -200,3 +202,20 @@ def test_the_list_of_printed_texts_has_them_with_their_values_and_what_explain_a
     assert not any("(?" in each or "\\d" in each for each in lines)
     assert "Lists every text that" not in listed
     assert "How far a campaign is, also while its folder is being filled" not in listed
+
+
+def test_the_ring_of_another_size_has_the_diameter_that_is_said() -> None:
+    """Of N sections the corners stand 2 (half_bar + hinge_offset) / sin(pi / N) apart, across."""
+    page = ROOT / "docs" / "guide" / "scenes.md"
+    ((verb, name, *options),) = (call for text in blocks(page, "sh") for call in calls(text))
+    done = CliRunner().invoke(cli, [verb, name, *options])
+    assert done.exit_code == 0, done.output
+    ring = load_scene(name).structure
+    own = {path: float(value) for path, _, value in (each.partition("=") for each in options[1::2])}
+    half = own["structure.half_bar"] + ring.hinge_offset
+    told = f"circle of {2.0 * half / math.sin(math.pi / ring.sections):.4f} m"
+    assert told in done.output
+    assert told in page.read_text(encoding="utf-8")
+    ratio = own["structure.half_bar"] / ring.half_bar
+    assert own["structure.half_diagonal"] == pytest.approx(ratio * ring.half_diagonal, rel=1e-3)
+    assert own["boom.length"] == pytest.approx(ratio * load_scene(name).boom.length, rel=1e-2)

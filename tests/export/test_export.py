@@ -18,6 +18,7 @@ import ringsim.export
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.shapes import COMPUTED, FROM_ANGLES, shape_of
+from ringsim.tables import size_text
 
 
 def export(*words: object, code: int = 0) -> str:
@@ -116,15 +117,16 @@ def test_chosen_variables_alone_are_written(file: Path, campaign: xr.Dataset) ->
     )
 
 
-def test_long_tables_are_told_before_they_are_written(
+def test_large_tables_are_told_before_they_are_written(
     file: Path, campaign: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rows = campaign["position"].size
-    assert rows > campaign["opening_angle"].size
-    monkeypatch.setattr(ringsim.export, "MANY", rows - 1)
-    assert f"the longest table has up to {rows:,} rows: choose variables" in export(file)
-    monkeypatch.setattr(ringsim.export, "MANY", rows)
-    assert "rows" not in export(file)
+    size = ringsim.export.size_of_csv(campaign)
+    assert "of CSV" not in export(file)
+    tables = [*file.parent.glob(f"{file.stem}-*.csv")]
+    written = sum(table.stat().st_size for table in tables if "variables" not in table.name)
+    assert 0.5 * written < size < 2.0 * written
+    monkeypatch.setattr(ringsim.export, "LARGE", size - 1.0)
+    assert f"writing about {size_text(size)} of CSV: choose variables" in export(file)
 
 
 def test_matlab(file: Path, run_file: Path, campaign: xr.Dataset) -> None:

@@ -20,6 +20,7 @@ from loops import for_each
 import ringsim
 from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
 from ringsim.cli import cli
+from ringsim.measured import load_measured
 from ringsim.plots.comparison import learnt
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import Calibrated, Lognormal, Truncated, Uniform
@@ -156,6 +157,20 @@ def test_budget_can_be_set_in_the_call(test_files):
     assert given.campaign.scene.solver.step == 0.02
 
 
+def test_the_stand_plans_with_the_two_changes_that_the_page_names(tmp_path):
+    stand = Path(__file__).parents[2] / "campaigns" / "stand"
+    text = (stand / "measured.toml").read_text(encoding="utf-8")
+    line = "clock = { interval = 0.5, end = 9.0 }"
+    page = (stand.parents[1] / "docs" / "guide" / "calibrate.md").read_text(encoding="utf-8")
+    assert line in page
+    text = text.replace('file = "readings.csv"\n', f"{line}\n")
+    text = text.replace('[clock]\ncolumn = "t"\n', "")
+    (tmp_path / "planned.toml").write_text(text, encoding="utf-8")
+    readings = load_measured(tmp_path / "planned.toml", planned=True).readings
+    assert len(readings) == text.count("[[sensors]]")
+    np.testing.assert_allclose(readings[0].times, np.arange(0.5, 9.25, 0.5))
+
+
 def test_what_is_printed_is_what_the_file_holds(test_files, found):
     posterior, folder = found
     done = CliRunner().invoke(cli, ["calibrate", str(test_files), "--out", str(folder)])
@@ -171,6 +186,8 @@ def test_what_is_printed_is_what_the_file_holds(test_files, found):
     assert "hardly learnt from these sensors: rods.poisson_ratio" in done.output
     assert "the posterior explains every sensor" in done.output
     assert f"wrote {folder / POSTERIOR}" in done.output
+    first = done.output.splitlines()[0]
+    assert first == "cal: 48 runs in 3 stages of 16, one after the other; what has run is kept"
 
 
 def equal(one, other):

@@ -21,6 +21,25 @@ def test_numbers_end_with_the_digits_of_their_error_bars() -> None:
     assert told["peak_tension"] == "31.968 N"  # no error is known
 
 
+def test_a_tension_that_is_larger_behind_the_last_lock_is_no_peak_and_told() -> None:
+    """In single precision, as files have it, 31.968 N are larger by 1e-8 of it."""
+    values = {"peak_tension": np.array(31.968)}
+    for most, more in ((31.968, False), (32.0, True)):
+        values["cable_tension"] = np.array([[[np.nan, 12.0, most]]], dtype="f4")
+        told = summary(values, {})["peak_tension"]
+        assert told.endswith("; more than that after the last lock") == more
+
+
+def test_slack_is_told_from_when_on_and_where_if_there_was_some() -> None:
+    places = {"plane": "upper", "span": 3, "time": 9.25}
+    values = {f"longest_slack_{name}": np.array(each) for name, each in places.items()}
+    values["longest_slack"] = np.array(18.9)
+    spans = {"upper": ("winch to a", "a to b", "b to c")}
+    told = " ".join(summary(values, spans)["longest_slack"].split())
+    assert told == "18.9 s from 9.25 s on: upper, span 3 (b to c)"
+    assert "longest_slack" not in summary({"longest_slack": np.array(0.0)}, spans)
+
+
 def test_loads_are_told_by_how_far_they_stay_below_their_limits() -> None:
     limits = {"limits.tension": 40.0, "limits.rod_stress": 3e7, "record.stress": True}
     scene = load_scene("ring18-cable").with_values(limits)

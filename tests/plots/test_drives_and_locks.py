@@ -225,7 +225,9 @@ def test_the_margin_of_a_run_ends_where_the_last_winch_stops(
 ) -> None:
     run = with_margin(-0.005, moment, stop)
     axes = drive(run).axes[1]
-    assert told == axes.get_title(loc="left")  # above the frame, where no curve runs
+    words, factors = axes.get_title(loc="left").split("\n")  # above the frame, where no curve runs
+    assert words == told
+    assert "factors of the standard" in factors
     assert axes.get_ylabel().startswith("Margin by NASA-STD-5017B")
     last = TIMES[stop > TIMES][-1]
     curve, _, least = axes.lines

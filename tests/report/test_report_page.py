@@ -229,11 +229,24 @@ def test_inputs_of_one_place_and_of_several_paths_have_their_origin() -> None:
     assert one not in found
 
 
+def test_values_that_their_paths_do_not_explain_have_a_remark() -> None:
+    told = {each.path: each.comment for each in model.values_of(made_campaign(2))[0]}
+    assert told["rods.elements"] == "per rod half"
+    assert told["structure.polygon_sections"].startswith("without effect")
+    campaign = made_campaign(2)
+    arc = {"structure.closed": False, "structure.sections": 4}
+    campaign.attrs["scene"] = made_scene().with_values(arc).to_toml()
+    told = {each.path: each.comment for each in model.values_of(campaign)[0]}
+    assert "without effect" not in told["structure.polygon_sections"]
+
+
 @pytest.mark.usefixtures("_undrawn")
 def test_the_page_begins_with_the_question() -> None:
     campaign = made_campaign(3)
     asked, text = '<p id="question">Does it open &amp; is it &lt;3 deg?</p>', page(campaign, "here")
     assert text.index("</h1>") < text.index(asked) < text.index("<main>")
+    # The scene's title, with the number of sections that it has.
+    assert "4-section" in text.partition("<main>")[0].partition("samples of the scene")[2]
     campaign.attrs["campaign"] = campaign.attrs["campaign"].replace("question", "# question")
     assert 'id="question"' not in page(campaign, "here")
 
