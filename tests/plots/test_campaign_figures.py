@@ -266,8 +266,8 @@ def test_motors_and_base_are_drawn_by_ending() -> None:
     assert [a.get_title(loc="left") for a in torques] == ["upper cable", "lower cable"]
     for axes in torques:
         lines = {line.get_label(): line.get_ydata() for line in axes.lines}
-        np.testing.assert_allclose(lines["stalled (2)"], 6e-3)
-        np.testing.assert_allclose(lines["deployed (5)"], 4e-3)
+        np.testing.assert_allclose(lines["stalled (2), line: sample 4"], 5e-3)
+        np.testing.assert_allclose(lines["deployed (5), line: sample 3"], 4e-3)
     force, torque = base_load(campaign).axes
     for axes, scale in ((force, 1.0), (torque, 0.5)):
         np.testing.assert_allclose(axes.lines[0].get_ydata(), 6.0 * scale)
