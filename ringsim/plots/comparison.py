@@ -17,7 +17,6 @@ from ringsim.analysis.design import (
     judged_by,
     median_and_worst,
     population_of,
-    scalars,
     values_of,
 )
 from ringsim.analysis.intervals import good, numbers, tells_of, used
@@ -29,6 +28,7 @@ from ringsim.plots.campaign.frame import (
     APART,
     at_or_below,
     base_of,
+    drawable,
     legend,
     limits,
     middle_told,
@@ -76,8 +76,8 @@ def _figures(
 ) -> Iterator[tuple[str, str, Figure]]:
     both = population_of(first), population_of(second)
     if "sample" in first.dims:
-        known = [set(scalars(each)) for each in both]
-        every = [n for n in differing(found) if all(n in each for each in known)]
+        known = {name for each in both for name in drawable(each)}
+        every = [n for n in differing(found) if n in known]
         names = [n for n in every if not _still(both, n)] or every
         unmoved = [n for n in every if n not in names]
         if names and found.attrs["pairs"]:

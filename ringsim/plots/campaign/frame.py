@@ -23,7 +23,7 @@ from ringsim.analysis.design import (
     scalars,
     values_of,
 )
-from ringsim.analysis.intervals import good, quantities, tells_of, used, varies
+from ringsim.analysis.intervals import good, is_moment, quantities, tells_of, used, varies
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import losses, one_at_a_time
 from ringsim.outputs.family import VARIABLES, Array
@@ -112,26 +112,42 @@ APART = 1e-3
 tables give changes."""
 
 
+def drawable(campaign: xr.Dataset) -> list[str]:
+    """Main numbers, and whatever else tables have that differs between samples, or is limited."""
+    limited, names = required_by(campaign.attrs), scalars(campaign)
+    return names + [
+        name for name, variable in quantities().items()
+        if name not in names and name in campaign and len(values_of(campaign, name)[1])
+        and (name in limited or (
+            variable.dtype == "f8" and not is_moment(name) and varies(campaign, name)
+        ))
+    ]  # fmt: skip
+
+
 def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tuple[list[str], str]:
-    """So many main numbers that differ between samples or have limits, and a word on others.
+    """So many numbers that differ between samples or have limits, and a word on others.
 
     ``what`` is what the figure draws of each, where that is not all.
 
-    All count if none differs.  Those with limits go first if there are more.
+    All count if none differs.  If there are more, those with limits go first, then those that
+    differ most for their size.
     """
-    limited = required_by(campaign.attrs)
-    names = scalars(campaign)
-    names += [
-        name for name in limited
-        if name in campaign and name in quantities() and name not in names
-        and len(values_of(campaign, name)[1])
-    ]  # fmt: skip
+    limited, names = required_by(campaign.attrs), drawable(campaign)
     flat, told = still(campaign, names)
     names = [name for name in names if name not in flat]
     if len(names) > most:
         names.sort(key=lambda name: name not in limited)
-        told += f" Not drawn for want of room: {what}{', '.join(names[most:])}."
-    return names[:most], told
+        order = sorted(names, key=lambda name: (name not in limited, -_spread(campaign, name)))
+        others = [name for name in names if name in order[most:]]
+        told += f" Not drawn for want of room: {what}{', '.join(others)}."
+        names = [name for name in names if name not in others]
+    return names, told
+
+
+def _spread(campaign: xr.Dataset, name: str) -> float:
+    """Range of a number over its size."""
+    values = values_of(campaign, name)[1]
+    return float(np.ptp(values) / np.abs(values).max()) if values.any() else 0.0
 
 
 def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
