@@ -57,7 +57,9 @@ def test_the_fan_shows_the_range_and_the_median_sample(mixed: xr.Dataset) -> Non
         (worst,) = (line for line in axes.lines if line.get_label() != "median")
         largest = np.abs(worst.get_ydata()).max()
         assert largest == pytest.approx(np.abs(lags(6)[plane, section]), abs=1e-5)
-    assert "median: sample 3 worst: sample 6" in legend_of(figure)
+    assert legend_of(figure) == "all samples median: sample 3 worst: sample 6"
+    beside = [axes.get_ylabel() for axes in figure.axes[::SECTIONS]]
+    assert beside == ["upper\nplane", "lower\nplane"]
     lines = [each for each in figure.legends[0].legend_handles if isinstance(each, Line2D)]
     dashed = {each.get_label(): each.get_linestyle() for each in lines}
     assert dashed["worst: sample 6"] != dashed["median: sample 3"]

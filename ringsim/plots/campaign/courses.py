@@ -32,8 +32,8 @@ from ringsim.plots.run import LEAST_SPAN
 
 _NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")
 """Asynchrony first: without a value of it there is nothing to draw."""
-_LOOKS = ((style.BLUE, "solid", 1.9), (style.ORANGE, (0, (3, 1.5)), 1.2))
-"""Colour, dashes and width of each plane's line: alike ones are both seen, one on the other."""
+_LOOKS = style.BLUE, style.VERMILLION
+"""Colour of each plane, dark enough for print in grey; words beside its panels name it."""
 _WORST: dict[str, Any] = {
     "color": style.INK, "linewidth": 1.0, "linestyle": (0, (6, 1.2, 1, 1.2)),
 }  # fmt: skip
@@ -79,7 +79,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
             axes.set_visible(False)
             continue
         own = found.sel(plane=plane, section=sections[number])
-        colour, dashes, width = looks[plane]
+        colour = looks[plane]
         for look, case in cases:
             axes.plot(case["time"], case.sel(plane=plane, section=sections[number]), **look)
         if not cases:
@@ -88,11 +88,11 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
                               edgecolor=colour)  # fmt: skip
         if line is not None and not cases:
             axes.plot(line["time"], line.sel(plane=plane, section=sections[number]), color=colour,
-                      linewidth=width, linestyle=dashes, label="median", zorder=4)  # fmt: skip
+                      label="median", zorder=4)  # fmt: skip
         if one is not None:
             single = one.sel(plane=plane, section=sections[number])
             axes.plot(single["time"], single, zorder=3, **_WORST)
-        if cases and not column:
+        if not column:
             axes.set_ylabel(f"{plane}\nplane", fontsize=8)
         if plane == planes[0]:
             axes.set_title(f"section {sections[number]}", fontsize=9, pad=3)
@@ -101,14 +101,11 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
             axes.set_xlabel(style.label(found["time"], width=24), fontsize=8)
     figure.supylabel(style.label(found, width=26), fontsize=10)
     words: list[Line2D | Patch] = [
-        Line2D([], [], color=colour, linestyle=dashes, linewidth=width, label=f"{plane} plane")
-        for plane, (colour, dashes, width) in looks.items()
-    ]
-    words.append(Patch(facecolor=(style.GREY, 0.15), edgecolor=style.GREY, linewidth=0.5,
-                       label="all samples"))  # fmt: skip
+        Patch(facecolor=(style.GREY, 0.15), edgecolor=style.GREY, linewidth=0.5,
+              label="all samples"),
+    ]  # fmt: skip
     if line is not None:
-        words.append(Line2D([], [], color=style.GREY, linewidth=1.8,
-                            label=f"median: sample {middle}"))  # fmt: skip
+        words.append(Line2D([], [], color=style.GREY, label=f"median: sample {middle}"))
     lines = [] if one is None else [Line2D([], [], label=f"worst: sample {worst}", **_WORST)]
     handles: list[Line2D | Patch] = [*words, *lines]
     if cases:
