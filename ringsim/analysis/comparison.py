@@ -42,7 +42,7 @@ from ringsim.analysis.requirements import (
 )
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.verdicts import Verdict, judge
-from ringsim.analysis.worst import NOTE, losses
+from ringsim.analysis.worst import NOTE, losses, margins
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
 from ringsim.variables import about, flags_of
@@ -222,11 +222,11 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
     between samples); an output that only one of them has is missing in the other, and in the
     difference.  The pairs whose outcome
     differs along ``change``; shares of outcomes along ``kind`` and of samples that meet a
-    requirement along ``requirement``, see ``differences_of_shares``; the scenes' values that differ
-    along ``setting``, by path.  Samples are those that ``analyse`` counts; means and shares are
-    those of populations, and of pairs of grids and lists.  ``pairing`` among the attributes says
-    what is paired; ``names`` are what tables and figures call the two.  InputError if one holds a
-    run and the other a campaign.
+    requirement along ``requirement``, see ``differences_of_shares``; the margins to equal limits of
+    both along ``limit``; the scenes' values that differ along ``setting``, by path.  Samples are
+    those that ``analyse`` counts; means and shares are those of populations, and of pairs of grids
+    and lists.  ``pairing`` among the attributes says what is paired; ``names`` are what tables and
+    figures call the two.  InputError if one holds a run and the other a campaign.
     """
     if ("sample" in first.dims) != ("sample" in second.dims):
         raise InputError(
@@ -257,8 +257,27 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
     shares = differences_of_shares((one, other), placed, (pairs.first, pairs.second))
-    more = _changed((one, other), pairs) | settings((one, other))
+    more = _changed((one, other), pairs) | settings((one, other)) | _limits((first, second))
     return found.assign(more).assign(shares)
+
+
+def _limits(both: Both) -> dict[str, Any]:
+    """The worst value and the margin of both sides to every limit that is the same in both, see
+    ``worst.margins``; no variables without any.
+    """
+    known = [margins(each if "sample" in each.dims else each.expand_dims(sample=[0]))
+             for each in both]  # fmt: skip
+    if not all("limit" in each.dims for each in known):
+        return {}
+    sides = [each.set_index(limit="limit_text") for each in known]
+    same = [text for text in sides[0]["limit"].values if text in sides[1]["limit"].values]
+    one, other = (each.sel(limit=same) for each in sides)
+    found: dict[str, Any] = {"limit": ("limit", np.array(same, dtype=object))}
+    found["limit_output"] = "limit", one["limit_output"].values, one["limit_output"].attrs
+    for name in ("limit_value", "limit_margin"):
+        values = np.stack([one[name].values, other[name].values], axis=-1)
+        found[name] = ("limit", "side"), values, one[name].attrs
+    return found
 
 
 _SCENES_OWN = ("name", "title")

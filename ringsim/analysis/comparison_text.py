@@ -20,6 +20,7 @@ from ringsim.tables import (
     readable,
     slim,
     unit_text,
+    with_unit,
 )
 from ringsim.variables import Fate
 
@@ -123,6 +124,7 @@ def sections(found: xr.Dataset) -> dict[str, Section]:
         Section("requirements", "Requirements", [
             _shares(found, "kept", "requirement", "samples that meet")
         ]),
+        Section("limits", "Margins to limits", [_limits(found)]),
         Section("outputs", "Numbers", [_outputs(found)]),
     )  # fmt: skip
     return {
@@ -169,6 +171,21 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
         heads += tuple(f"verdict in {name}" for name in names_of(found))
     columns = 3 if single else len(heads)
     return marked(Table(heads[:columns], [row[:columns] for row in rows]), found)
+
+
+def _limits(found: xr.Dataset) -> Table:
+    """The worst values of both and their margins to the limits that both have."""
+    rows, names = [], names_of(found)
+    for text in found["limit"].values if "limit" in found.dims else ():
+        one = found.sel(limit=text)
+        values = one["limit_value"].values
+        factor, units = readable(
+            quantities()[one["limit_output"].item()].units, np.abs(values).max()
+        )
+        worst = (with_unit(number_text(factor * value), units) for value in values.tolist())
+        rows.append((str(text), *worst, *(f"{m:+.3g}" for m in one["limit_margin"].values)))
+    heads = (f"{what} in {name}" for what in ("worst value", "margin") for name in names)
+    return Table(("limit", *heads), rows, left=1)
 
 
 def _changed(found: xr.Dataset) -> Table:
@@ -218,7 +235,8 @@ def _outputs(found: xr.Dataset) -> Table:
                 continue
             largest = number_text(most)
             place = str(found[f"{name}_largest_difference_sample"].item())
-            together = f"{found[f'{name}_rank_correlation'].item():+.2f}".replace("+nan", "-")
+            rank = found[f"{name}_rank_correlation"].item()
+            together = "-" if np.isnan(rank) else f"{rank:+.2f}"
         fine = digits_of(min(first, second), max(first, second))
         rows.append((
             name, unit_text(unit),

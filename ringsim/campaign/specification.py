@@ -170,11 +170,15 @@ class Specification(Model):
         return Rule(conditions=self.stop_when, looks=self.looks) if self.stop_when else None
 
 
+_NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+"""Bounds that are values of other fields are told by their names: no end of a distribution."""
+
+
 def _cure(error: str, inputs: Mapping[str, Distribution]) -> str:
     """What helps against a drawn value that is refused for a bound; empty if that is said, or if
     its distribution has ends of its own.
     """
-    bound = re.search(r"must be (at least|above|at most|below) (\S+)", error)
+    bound = re.search(rf"must be (at least|above|at most|below) ({_NUMBER})", error)
     path = max((path for path in inputs if f"{path} = " in error), key=len, default="")
     if bound is None or not path or "truncate" in error:
         return ""

@@ -2,6 +2,7 @@
 
 import json
 import math
+import operator
 import textwrap
 from collections import Counter
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 from click.shell_completion import CompletionItem
 
 from ringsim.choice import kind_of, kinds_of
@@ -34,7 +36,7 @@ from ringsim.rigid.margin import (
 from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
 from ringsim.scene.substituted import strained, substituted
 from ringsim.tables import counted, text_table, unit_text
-from ringsim.units import Model
+from ringsim.units import Model, unit_at
 from ringsim.variables import Variable
 
 SCHEMA = "scene.schema.json"
@@ -139,6 +141,18 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
     click.echo(f"valid{lacking}: ringsim run FILE runs it")
 
 
+_USUAL = {
+    "joints.vjoint.coulomb": (
+        0.0, 1.0, "a pin of 10 mm with a dry friction of 0.3 has that under a load of 670 N"),
+    "joints.pivot.coulomb": (
+        0.0, 1.0, "a pin of 10 mm with a dry friction of 0.3 has that under a load of 670 N"),
+    "limits.rod_stress": (
+        1e6, 1e10, "plastics bear more than 1 MPa, and no fibre 10 GPa; files give it in Pa"),
+}  # fmt: skip
+"""The least and the largest value, by path, that are not taken for a slip, and why."""
+_SOFT = 1e3
+"""Axial stiffness of a rod, N, below which a figure of it is taken for a slip: the 10 N of a rope
+make it longer by a hundredth."""
 _TOO_HEAVY = 100.0
 """Mass of all corners over that of all rods above which a figure of it is taken for a slip."""
 
@@ -171,6 +185,21 @@ def _doubtful(scene: Scene) -> Iterator[str]:
                 f"faults[{number}].time = {fault.time:g} s is after solver.end_time = {end:g} s: "
                 "it never happens"
             )
+    for path, (least, most, why) in _USUAL.items():
+        inner, _, last = path.rpartition(".")
+        value = getattr(operator.attrgetter(inner)(scene), last, None)
+        if value is not None:
+            low, high, unit = np.min(value), np.max(value), unit_at(scene, path)
+            if low < least:
+                yield f"{path} = {low:g} {unit} is below {least:g} {unit}: {why}"
+            if high > most:
+                yield f"{path} = {high:g} {unit} is above {most:g} {unit}: {why}"
+    softest = min(layout.rods, key=lambda rod: rod.young_modulus * rod.tube.area)
+    if (stiffness := softest.young_modulus * softest.tube.area) < _SOFT:
+        yield (
+            f"rods: the axial stiffness E A of the {softest.group} is {stiffness:.3g} N, below "
+            f"{_SOFT:g} N: a pull of 10 N makes it longer by more than 1 %"
+        )
     masses, rods = layout.masses(), {rod.group for rod in layout.rods}
     own = sum(mass for name, mass in masses.items() if name in rods)
     if masses.get("hinges", 0.0) > _TOO_HEAVY * own:

@@ -200,14 +200,27 @@ class DriveMargins(Output):
         ),
         Variable("least_drive_margin_time", (), "s", "time of least_drive_margin"),
         Variable("least_drive_margin_angle", (), "degree", "mean opening angle then"),
+        Variable(
+            "least_drive_margin_plane", ("plane",), "1",
+            "smallest static margin of a plane's own cable against half of all that resists, at "
+            "the angles that the plane passed until it had locked",
+        ),
+        Variable(
+            "least_plane_margin", (), "1", "least_drive_margin_plane of the plane with less",
+            worse="smaller", least_of="least_drive_margin_plane",
+        ),
     )  # fmt: skip
 
     def told(self, values: Values, span_names: SpanNames) -> str:
-        """As "at 20.5 deg and 0.1 s: NOT enough"."""
+        """As "at 20.5 deg and 0.1 s: NOT enough"; of a plane whose own cable falls short by more
+        than the mean of both, "at 20.5 deg and 0.1 s: enough, but one plane has -1.000".
+        """
         names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
         word = "enough" if margin >= 0.0 else "NOT enough"
-        return f"at {angle:.4g} deg and {time:.4g} s: {word}"
+        plane = float(values.get("least_plane_margin", math.nan))
+        own = f", but one plane has {plane:.3f}" if plane < min(margin, 0.0) - 5e-4 else ""
+        return f"at {angle:.4g} deg and {time:.4g} s: {word}{own}"
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Nothing: ``ringsim.rigid.margin`` knows them."""

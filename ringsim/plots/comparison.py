@@ -19,13 +19,12 @@ from ringsim.analysis.design import (
     population_of,
     values_of,
 )
-from ringsim.analysis.intervals import good, numbers, tells_of, used
+from ringsim.analysis.intervals import ALIKE, good, hardly_apart, numbers, tells_of, used
 from ringsim.analysis.posterior import UNEXPLAINED
 from ringsim.analysis.residuals import Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import (
-    APART,
     at_or_below,
     base_of,
     drawable,
@@ -98,13 +97,13 @@ def _still(both: Both, name: str) -> bool:
     """Whether all values of both are the same to a thousandth, and nothing is required of them."""
     every = np.concatenate([values_of(each, name)[1] for each in both])
     wanted = any(limits(each, name) for each in both)
-    return bool(every.size) and not wanted and np.ptp(every) < APART * np.abs(every).max()
+    return bool(every.size) and not wanted and hardly_apart(every.min(), every.max())
 
 
 def _noted(figure: Figure, unmoved: list[str]) -> Figure:
     """A figure that says below its panels which numbers have none."""
     if unmoved:
-        words = f"Not drawn, because samples differ by less than {100 * APART:g} %: "
+        words = f"Not drawn, because samples differ by less than {100 * ALIKE:g} %: "
         words = textwrap.fill(words + ", ".join(unmoved), int(12.0 * figure.get_figwidth()))
         figure.legends[0].set_title(words)
         figure.legends[0].get_title().set_fontsize(9)

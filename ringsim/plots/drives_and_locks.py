@@ -29,10 +29,10 @@ def drive(dataset: xr.Dataset) -> Figure:
     ``least_drive_margin``.
 
     Drawn over the mean opening angle of all V-joints, as long as it grows; resistances that drive
-    are left out.  The margin is that of a ring which opens as a whole, and ends where a winch
-    stops: the rope that this one holds lets its plane open no further.
+    are left out.  The margin is that of a ring which opens as a whole, and ends where the last
+    winch stops: see ``drive_end``.
     """
-    stopped, winch = first_stop(dataset)
+    stopped = float(drive_end(dataset))
     known = dataset.isel(time=np.flatnonzero(np.isfinite(dataset["drive_margin"].values)))
     angle = known["opening_angle"].mean(("plane", "section")).values
     grows = angle >= np.maximum.accumulate(angle)
@@ -58,16 +58,14 @@ def drive(dataset: xr.Dataset) -> Figure:
     margin = known["drive_margin"].where(known["time"] < stopped).values
     lower.plot(angle, margin, color=style.BLUE)
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
-    names = ("least_drive_margin_angle", "least_drive_margin", "least_drive_margin_time")
-    where, least, moment = (float(dataset[name]) for name in names)
-    if moment >= stopped and np.isfinite(margin).any():
-        where, least = angle[np.nanargmin(margin)], np.nanmin(margin)
+    names = ("least_drive_margin_angle", "least_drive_margin")
+    where, least = (float(dataset[name]) for name in names)
     told = []
     if np.isfinite(margin).any():
         lower.plot(where, least, "o", color=style.VERMILLION, markersize=6, zorder=4)
         told = [f"least margin {least:.3f} at {where:.0f} deg"]
     if (known["time"] >= stopped).any():
-        told.append(f"no margin from {stopped:.4g} s on: the {winch} has stopped")
+        told.append(f"no margin from {stopped:.4g} s on: all winches have stopped")
     lower.set_title("; ".join(told), fontsize=9.5)  # inside it would lie on the curve
     style.margin_axis(lower, margin, f"Margin by {standard_of(dataset)}")
     lower.set_xlabel("Mean opening angle (deg)")
@@ -81,35 +79,27 @@ def standard_of(dataset: xr.Dataset) -> str:
     return "the standard" if margin is None else kind_of(margin).upper()
 
 
-def first_stop(dataset: xr.Dataset) -> tuple[float, str]:
-    """When the first of a run's winches is switched off (s), and its name; infinity if none is."""
-    ends = {name: float(time) for name, time in stop_times(dataset).items()}
-    return min(((time, name) for name, time in ends.items()), default=(np.inf, ""))
+def drive_end(dataset: xr.Dataset) -> Array:
+    """When the last winch is switched off, s, () of a run, (sample,) of a campaign: nobody drives
+    from then on, and there is no margin any more.  Infinity if one never is.
 
-
-def stop_times(dataset: xr.Dataset) -> dict[str, Array]:
-    """When each winch is switched off, s, by its name: () of a run, (sample,) of a campaign;
-    infinity if it is not.
-
-    From then on it holds its rope, which lets its plane open no further: the drive has no margin
-    any more.  Of winches that turn at all, and not of those that stop because their plane has
-    locked.
+    Not of winches that stop because their plane has locked.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     drawn = {path: dataset[name].to_numpy() for name in inputs(dataset)
              for path in paths_of(dataset[name]) if path.endswith("_time")}  # fmt: skip
-    found = {}
+    last = np.array(-np.inf)
     for plane, cable in [] if scene.cables is None else scene.cables.present():
-        called = scene.structure.planes[plane]
-        for end, winch in zip(("winch", "far winch"), cable.winches, strict=False):
-            own = "winch" if cable.far_winch is None else end.replace(" ", "_")
-            path = f"cables.{called}.{own}"
+        for key, winch in zip(("winch", "far_winch"), cable.winches, strict=False):
+            own = "winch" if cable.far_winch is None else key
+            path = f"cables.{scene.structure.planes[plane]}.{own}"
             begin, stop = (
                 _seconds(drawn.get(f"{path}.{name}", np.array(str(getattr(winch, name)).lower())))
                 for name in ("start_time", "stop_time")
             )
-            found[f"{end} of the {called} cable"] = np.where(stop == begin, np.inf, stop)
-    return found
+            # One that starts as it stops never turns.
+            last = np.maximum(last, np.where(stop == begin, -np.inf, stop))
+    return np.where(np.isfinite(last), last, np.inf)
 
 
 def _seconds(values: Array) -> Array:

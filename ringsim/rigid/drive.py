@@ -1,5 +1,6 @@
 """What faults and switched winches leave of a drive on a ring of rigid rods, over the time."""
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple, cast
@@ -65,6 +66,16 @@ class Conditions:
         """When the first winch starts, s; nothing is to be driven before."""
         starts = [winch.start_time for winch in self.winches.values() if turns_ever(winch)]
         return min(starts, default=0.0)
+
+    @cached_property
+    def end(self) -> float:
+        """When the last winch is switched off, s; infinite if one never is, or there is none.
+
+        A winch that a fault leaves without rope still turns: what has failed is not switched off.
+        """
+        stops = [winch.stop_time for winch in self.winches.values() if turns_ever(winch)]
+        known = [stop for stop in stops if stop is not None]
+        return max(known) if known and len(known) == len(stops) else math.inf
 
     @cached_property
     def changes(self) -> list[float]:

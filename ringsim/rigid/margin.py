@@ -182,15 +182,19 @@ def place_of_winch(scene: Scene, cable: int, end: int) -> str:
     return f"cables.{scene.structure.planes[plane]}.{('winch', 'far_winch')[end]}"
 
 
-def _still_off(scene: Scene, drive: DriveMargin, time: float) -> str:
-    """What a reason says of winches that start after the time (s) of the least margin."""
+def _still_off(scene: Scene, drive: DriveMargin, time: float, last: float) -> str:
+    """What a reason says of winches that start after the time (s) of the least margin, and of a
+    ring that goes on until the ``last`` time (s) after all of them have been switched off.
+    """
     late = [
         f"{place_of_winch(scene, *where)} starts at {winch.start_time:g} s"
         for where, winch in drive.conditions.winches.items()
         if turns_ever(winch) and time < winch.start_time - AT_ONCE
     ]
     told = f"; the least drive margin is that of {time:.4g} s, before {' and '.join(late)}"
-    return told if late else ""
+    end = drive.conditions.end
+    over = f"; the least drive margin ends at {end:.4g} s, when the last winch is switched off"
+    return told * bool(late) + over * (last > end + AT_ONCE)
 
 
 def _margin(drive: float, required: float) -> float:
@@ -251,13 +255,16 @@ def least_along(
 ) -> Least:  # fmt: skip
     """The smallest margin over all angles that a run passed, by the search of ``check --margin``.
 
-    Each angle counts with what is whole and on while it is passed.  Where a ring turned back
-    between two output times is not seen.  Some margins may be ``known``, with their times (s).
+    Each angle counts with what is whole and on while it is passed.  What is passed after the last
+    winch has been switched off does not: nobody drives there, and a margin of -1 would speak of a
+    drive that has done its work.  If one of two stops, the other has to overcome all, and counts.
+    Where a ring turned back between two output times is not seen.  Some margins may be ``known``,
+    with their times (s).  The way must begin before the last winch is switched off.
     """
     found = []
     marks = [-math.inf, *drive.conditions.changes, math.inf]
     for begin, end in pairwise(marks):
-        if end <= way.times[0] or begin > way.times[-1]:
+        if end <= way.times[0] or begin > way.times[-1] or begin >= drive.conditions.end:
             continue
         now = way.between(begin, end)
         told = [one for time, one in known if begin - AT_ONCE <= time < end - AT_ONCE]
@@ -281,7 +288,8 @@ def with_margin(
     times = outcome.coordinates["time"]
     lock = float(outcome.values.get("deployment_time", math.nan))
     way = passed(times, outcome.values["opening_angle"], lock)
-    drives = [(until, _drive(substituted(one), scene.margin)) for until, one in before]
+    scenes = [*((until, substituted(one)) for until, one in before), (math.inf, scene)]
+    drives = [(until, _drive(one, scene.margin)) for until, one in scenes[:-1]]
     last = DriveMargin(scene, scene.margin)
     drives.append((math.inf, last))
     kinds = list(dict.fromkeys(kind for _, drive in drives if drive for kind in drive.kinds))
@@ -299,18 +307,23 @@ def with_margin(
             margin[own] = [min(one.margin, MOST) for one in rows]
             resisting[:, own] = [[one.resisting.get(kind, 0.0) for one in rows] for kind in kinds]
             known = list(zip(clock, rows, strict=True))
-            leasts.append(least_along(drive, way.between(begin, until), known))
+            if begin < drive.conditions.end:
+                leasts.append(least_along(drive, way.between(begin, until), known))
         begin = until
     values = {"drive_available": available, "drive_resistance": resisting, "drive_margin": margin}
     reason = outcome.reason
     if leasts:
         least = min(leasts)
-        reason += _still_off(scene, last, least.time)
+        reason += _still_off(scene, last, least.time, float(way.times[-1]))
         values |= {
             "least_drive_margin": np.asarray(least.margin),
             "least_drive_margin_time": np.asarray(least.time),
             "least_drive_margin_angle": np.asarray(math.degrees(least.angle)),
         }
+    by_plane = _by_plane(outcome, scenes, scene.margin)
+    if np.isfinite(by_plane).any():
+        values["least_drive_margin_plane"] = by_plane
+        values["least_plane_margin"] = np.asarray(by_plane.min())
     return replace(
         outcome,
         reason=reason,
@@ -319,12 +332,41 @@ def with_margin(
     )
 
 
-def _drive(scene: Scene, standard: MarginStandard) -> DriveMargin | None:
-    """None of a scene whose winches pulled with any force: it had no margin."""
+def _drive(
+    scene: Scene, standard: MarginStandard, plane: int | None = None
+) -> DriveMargin | None:  # fmt: skip
+    """Of both planes, or one; None of a scene whose winches pulled with any force: it had no
+    margin.
+    """
     try:
-        return DriveMargin(scene, standard)
+        return (
+            DriveMargin(scene, standard) if plane is None else PlaneMargin(scene, standard, plane)
+        )
     except InputError:
         return None
+
+
+def _by_plane(
+    outcome: Outcome, scenes: Sequence[tuple[float, Scene]], standard: MarginStandard
+) -> Array:  # fmt: skip
+    """The least margin of each plane at the mean angles of its own V-joints, until it has locked,
+    shape (planes,), of scenes each until a time (s); NaN unless there are cables in two planes.
+    """
+    opening = outcome.values["opening_angle"]
+    locks = outcome.values.get("lock_time", np.full(opening.shape[:2], math.nan)).max(axis=1)
+    found = np.full(len(opening), math.nan)
+    for plane, lock in enumerate(locks.tolist()):
+        way = passed(outcome.coordinates["time"], opening[[plane]], lock)
+        begin = -math.inf
+        for until, scene in scenes:
+            two = scene.cables is not None and len(scene.cables.present()) == 2
+            drive = _drive(scene, standard, plane) if two else None
+            inside = len(way.times) and begin <= way.times[-1] and until > way.times[0]
+            if drive is not None and inside and begin < drive.conditions.end:
+                least = least_along(drive, way.between(begin, until))
+                found[plane] = np.fmin(found[plane], least.margin)
+            begin = until
+    return found
 
 
 # The margin of one plane's drive, were it to carry half of all that resists.

@@ -11,7 +11,7 @@ from made_campaign import made_campaign, with_motors
 from made import campaign
 from ringsim.analysis.campaign_notes import peak_lines
 from ringsim.analysis.comparison import compare
-from ringsim.analysis.comparison_text import compared
+from ringsim.analysis.comparison_text import compared, sections
 from ringsim.analysis.design import median_and_worst
 from ringsim.analysis.intervals import quantities, worst_sample
 from ringsim.analysis.requirements import read_requirements
@@ -90,6 +90,32 @@ def test_a_limit_that_is_passed_and_a_margin_that_is_short_are_told_above_the_ve
     assert max(passed, short) < next(k for k, line in enumerate(lines) if "verdict" in line)
 
 
+def test_a_comparison_has_both_margins_to_the_limits_that_both_have() -> None:
+    """Sample k peaks at 20 + k N, in the second at 1.5 times that; only the first limits slack."""
+    first = with_limits(with_motors(made_campaign(8)), tension=30.0, slack_duration=1.0)
+    second = with_limits(with_motors(made_campaign(8)), tension=30.0)
+    second["peak_tension"], second["cable_tension"] = (
+        1.5 * second[name] for name in ("peak_tension", "cable_tension")
+    )
+    found = compare(first, second)
+    assert found["limit"].values.tolist() == ["limits.tension = 30 N", "least_drive_margin >= 0"]
+    assert found["limit_value"].values == pytest.approx(np.array([[27.0, 40.5], [-0.5, -0.5]]))
+    margins = [[30.0 / 27.0 - 1.0, 30.0 / 40.5 - 1.0], [-0.5, -0.5]]
+    assert found["limit_margin"].values == pytest.approx(np.array(margins))
+    (table,) = sections(found)["limits"].tables
+    assert table.head == (
+        "limit", "worst value in first", "worst value in second", "margin in first",
+        "margin in second",
+    )  # fmt: skip
+    assert table.rows[0] == ("limits.tension = 30 N", "27 N", "40.5 N", "+0.111", "-0.259")
+    # Of two runs as of campaigns of one sample; of other limits nothing is told.
+    runs = [each.isel(sample=2, drop=True) for each in (first, second)]
+    found = compare(*runs)
+    assert found["limit_value"].values[0] == pytest.approx([22.0, 33.0])
+    assert "limits" not in sections(compare(first, with_limits(made_campaign(8), tension=31.0)))
+    assert "limits" not in sections(compare(first, made_campaign(8)))
+
+
 def test_equal_values_take_the_first_sample_and_places_in_time_have_no_worst() -> None:
     made = campaign([2.0, 5.0, 5.0, np.nan], outcome=[1, 1, 1, 3])
     assert worst_sample(made, quantities()["asynchrony_max"]) == 1
@@ -108,11 +134,14 @@ def test_a_comparison_says_which_side_is_worse(name: str, sense: int) -> None:
         more = {name: values + shift + 0.01 * random.normal(size=40), "sample_seed": seeds}
         return campaign(values, **more)
 
+    def tells(line: str) -> bool:  # of the output, not of the margin to its limit
+        return name in line and ">=" not in line
+
     for shift in (0.1, -0.1):
-        [row] = [line for line in compared(compare(side(0.0), side(shift))) if name in line]
+        [row] = [line for line in compared(compare(side(0.0), side(shift))) if tells(line)]
         assert ("second" in row.split()) == (sense * shift > 0.0)
         assert ("first" in row.split()) == (sense * shift < 0.0)
-    [row] = [line for line in compared(compare(side(0.0), side(0.0))) if name in line]
+    [row] = [line for line in compared(compare(side(0.0), side(0.0))) if tells(line)]
     assert not {"first", "second"} & set(row.split())
 
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from motor_rings import PLAIN, ring
+from motor_rings import PLAIN, STALL, ring
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.layout.layout import layout_of
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.rigid.margin import DriveMargin, Passed, least_along, passed, with_margin
 from ringsim.scene import Scene
@@ -22,6 +23,7 @@ from ringsim.stored_state import read_state
 from ringsim.variables import PLANES, Outcome, Status
 
 ECSS = {"kind": "ecss-e-st-33-01c"}
+SPRING = {"kind": "linear", "stiffness": 0.004, "preload": 0.005}
 CUT = {"kind": "cut-cable", "cable": "lower", "span": 1}
 
 
@@ -95,6 +97,55 @@ def test_faults_and_switches_count_from_their_time_on() -> None:
     assert found["least_drive_margin"] == -1.0
     assert found["least_drive_margin_time"] == pytest.approx(0.9)
     assert found["least_drive_margin_angle"] == pytest.approx(60.0 + 120.0 * 0.81, abs=0.1)
+
+
+def virtual_work(planes: slice, angle: float) -> float:
+    """The margin of cables without friction in their pulleys at an angle (rad): their shortening,
+    by differences of the layout, against twelve V-joints of 0.01 N m.
+    """
+
+    def lengths(at: float) -> np.ndarray:
+        layout = layout_of(ring(), 0.5 * (math.pi - at))
+        places = [np.array([layout.sheave(each)[0] for each in path]) for path in layout.paths]
+        return np.array([np.linalg.norm(np.diff(each, axis=0), axis=1).sum() for each in places])
+
+    shortening = (lengths(angle - 1e-5) - lengths(angle + 1e-5)) / 2e-5
+    return STALL * float(shortening[planes].sum()) / (12 * 0.01) - 1.0
+
+
+UPPER, LOWER = "cables__upper__winch__stop_time", "cables__lower__winch__stop_time"
+BOTH, ONE = slice(0, 2), slice(0, 1)
+
+
+@pytest.mark.parametrize(
+    ("values", "least", "time"),
+    [
+        # What is passed after both have been stopped as planned needs no drive.
+        ({UPPER: 0.7, LOWER: 0.9}, (ONE, 60.0 + 120.0 * 0.49), 0.7),
+        ({UPPER: 0.9, LOWER: 0.9}, (BOTH, 60.0), 0.0),
+        # A motor that stops leaves all to the other.
+        ({LOWER: 0.5}, (ONE, 90.0), 0.5),
+        # One that has lost its rope was not stopped: nothing drives when the other is.
+        ({UPPER: 0.9, "faults": [CUT | {"time": 0.5}]}, None, 0.9),
+        # Springs that no winch ever helps: at 180 deg they give half of what resists.
+        ({UPPER: 0.0, LOWER: 0.0, "hinge_spring": SPRING}, -0.5, 1.0),
+    ],
+    ids=["one after the other", "both", "one alone", "lost rope", "springs alone"],
+)  # fmt: skip
+def test_the_margin_ends_where_nobody_drives_on_purpose(
+    values: dict[str, object], least: object, time: float
+) -> None:
+    plain = {"joints__vjoint": {"coulomb": 0.01}, "margin": PLAIN.model_dump()}
+    plain |= {f"cables__{plane}__friction": {"kind": "none"} for plane in PLANES}
+    run = with_margin(opened(0.05), ring(**plain | values))
+    truth = least if isinstance(least, float) else -1.0
+    if isinstance(least, tuple):
+        truth = virtual_work(least[0], math.radians(least[1]))
+    assert run.values["least_drive_margin"] == pytest.approx(truth, rel=1e-6)
+    assert run.values["least_drive_margin_time"] == pytest.approx(time, abs=1e-3)
+    words = "the least drive margin ends at 0.9 s, when the last winch is switched off"
+    both = values.get(LOWER) == 0.9
+    assert (words in run.reason) == both
 
 
 @pytest.mark.parametrize("interval", [0.02, 0.13])
@@ -190,3 +241,36 @@ def test_a_stretch_between_two_output_times_counts() -> None:
     found = with_margin(opened(0.1), whole, [(0.42, whole), (0.48, held)])
     assert float(found.values["least_drive_margin"]) == -1.0
     assert 0.42 - 1e-9 <= float(found.values["least_drive_margin_time"]) <= 0.48 + 1e-9
+
+
+def test_each_plane_has_the_margin_of_its_own_cable_along_its_own_angles() -> None:
+    """A jam in the lower cable at 0.5 s, at 90 deg, which the mean of both planes all but hides."""
+    plain = {"joints__vjoint": {"coulomb": 0.01}, "margin": PLAIN.model_dump()}
+    plain |= {f"cables__{plane}__friction": {"kind": "none"} for plane in PLANES}
+    jam = {"kind": "jammed-pulley", "cable": "lower", "pulley": 1, "time": 0.5}
+    found = with_margin(opened(0.05), ring(**plain, faults=[jam])).values
+    whole = virtual_work(BOTH, math.radians(60.0))
+    # The span from the winch to the first pulley keeps its length: behind the jam nothing pulls.
+    assert found["least_drive_margin_plane"] == pytest.approx([whole, -1.0], rel=1e-6)
+    assert found["least_plane_margin"] == pytest.approx(-1.0)
+    alone = virtual_work(ONE, math.radians(90.0))
+    assert found["least_drive_margin"] == pytest.approx(alone, rel=1e-6)
+    single = with_margin(opened(0.05), ring(**plain, cables__lower="none")).values
+    assert "least_plane_margin" not in single
+
+
+def test_a_plane_counts_what_it_passed_until_it_has_locked() -> None:
+    scene = netted()
+    drive = DriveMargin(scene, EcssMechanisms())
+    truth = drive.least()
+    run, last = opened(0.02), math.degrees(truth.angle) - 20.0
+    run.values["opening_angle"][1] = np.minimum(run.values["opening_angle"][1], last)
+    found = with_margin(run, scene).values["least_drive_margin_plane"]
+    # Planes are alike, so that the margin of each is that of both at its own angle.
+    both = [truth.margin, drive.at(math.radians(last)).margin]
+    assert found == pytest.approx(both, rel=1e-9)
+    stopped = netted(**{UPPER: 1.1})
+    assert with_margin(run, stopped).values["least_drive_margin_plane"][0] == -1.0
+    run.values["lock_time"] = np.repeat([[1.0], [np.nan]], 6, axis=1)
+    found = with_margin(run, stopped).values["least_drive_margin_plane"]
+    assert found[0] == pytest.approx(truth.margin, rel=1e-9)

@@ -12,7 +12,7 @@ from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_motor
 from ringsim.analysis.courses import courses, ends
 from ringsim.plots.campaign.endings import latch_rate, lock_impulse, margin
 from ringsim.plots.campaign.endings import motors as motors_of_samples
-from ringsim.plots.drives_and_locks import drive, least_rate, locks, motors, stop_times
+from ringsim.plots.drives_and_locks import drive, drive_end, least_rate, locks, motors
 from ringsim.plots.figures import figures_of
 from ringsim.plots.style import locked_time
 from ringsim.scene import Scene, load_scene
@@ -191,11 +191,12 @@ def test_a_ring_whose_latches_missed_is_not_over_when_it_came_to_180_degrees() -
 
 def with_margin(least: float, moment: float, stop: float) -> xr.Dataset:
     """A run of motors by the standard of NASA: its margin falls from 1 to ``least`` at a time (s),
-    and rises to 2 again; the lower winch stops at another.
+    and rises to 2 again; the upper winch stops at 2.5 s, the lower at a time of its own.
     """
     made = with_motors(made_campaign(1)).isel(sample=0, drop=True)
     scene = load_scene("ring18-motor").with_values({
         "structure.sections": SECTIONS, "margin.kind": "nasa-std-5017b",
+        "cables.upper.winch.stop_time": 2.5,
         "cables.lower.winch.stop_time": stop if math.isfinite(stop) else "none",
     })  # fmt: skip
     made["drive_margin"] = made["drive_margin"].copy(
@@ -216,13 +217,10 @@ def with_margin(least: float, moment: float, stop: float) -> xr.Dataset:
     [
         (5.0, math.inf, "least margin -0.005 at 100 deg"),
         (2.0, 6.0, "least margin -0.005 at 52 deg; "
-         "no margin from 6 s on: the winch of the lower cable has stopped"),
-        # The least one of all comes after the stop: of those before, it is the last.
-        (8.0, 4.0, "least margin 0.560 at 76 deg; "
-         "no margin from 4 s on: the winch of the lower cable has stopped"),
+         "no margin from 6 s on: all winches have stopped"),
     ],
 )  # fmt: skip
-def test_the_margin_of_a_run_ends_where_a_winch_stops(
+def test_the_margin_of_a_run_ends_where_the_last_winch_stops(
     moment: float, stop: float, told: str
 ) -> None:
     run = with_margin(-0.005, moment, stop)
@@ -236,12 +234,17 @@ def test_the_margin_of_a_run_ends_where_a_winch_stops(
     assert least.get_ydata()[0] == pytest.approx(curve.get_ydata()[known].min())
 
 
-def test_margins_of_a_campaign_end_where_the_winch_of_a_sample_stops() -> None:
+def test_margins_of_a_campaign_end_where_the_last_winch_of_a_sample_stops() -> None:
     """By the rule of the run's figure, for winches that the scene stops, and that samples do."""
     campaign = with_motors(made_campaign(6))
     assert campaign["cables_lower_winch_stop_time"].values[:2].tolist() == ["3.0", "none"]
     campaign["cables_lower_winch_stop_time"].attrs["path"] = "cables.lower.winch.stop_time"
     campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
+    assert np.isinf(drive_end(campaign)).all()  # the upper winch goes on
+    values = {"structure.sections": SECTIONS, "cables.upper.winch.stop_time": 2.0}
+    scene = load_scene("ring18-motor").with_values(values)
+    campaign.attrs["scene"] = scene.to_toml()
+    assert drive_end(campaign).tolist() == [3.0, np.inf] * 3
     lower = margin(campaign).axes[1]
     ends = []
     for line in lower.lines[:6]:
@@ -252,10 +255,4 @@ def test_margins_of_a_campaign_end_where_the_winch_of_a_sample_stops() -> None:
     assert ends[1::2] == pytest.approx([180.0] * 3)
     (legend,) = margin(campaign).legends
     told = " ".join(legend.get_title().get_text().split())
-    assert "Curves end where a winch stops, in 3 samples" in told
-    scene = load_scene("ring18-motor").with_values(
-        {"structure.sections": SECTIONS, "cables.upper.winch.stop_time": 2.0}
-    )
-    times = stop_times(campaign.assign_attrs(scene=scene.to_toml()))
-    assert times["winch of the upper cable"] == 2.0
-    assert times["winch of the lower cable"].tolist() == [3.0, np.inf] * 3
+    assert "Curves end where the last winch stops, in 3 samples" in told

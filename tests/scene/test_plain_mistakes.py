@@ -345,6 +345,16 @@ def test_refusals_of_campaigns_tell_the_cure(tmp_path: Path) -> None:
     line = refused("campaign", path, "--dry-run")
     assert re.search(r"joints\.vjoint\.coulomb = -0\.\d{1,11} N m must be at least 0 N m: ", line)
     assert line.endswith('draw it with kind = "truncated", low = 0, of = { kind = "normal", ... }')
+    # What another value of the scene bounds no end of a distribution cures.
+    wide = law.replace("-0.02", "0.02")
+    path.write_text(f'{CAMPAIGN}"rods.diagonal.inner_diameter" = {wide}\n')
+    line = refused("campaign", path, "--dry-run")
+    assert "must be below outer_diameter" in line
+    assert "truncated" not in line
+    steep = law.replace("-0.02", "179.95")
+    path.write_text(f'{CAMPAIGN}"structure.opening_angle" = {steep}\n')
+    line = refused("campaign", path, "--dry-run")
+    assert 'draw it with kind = "truncated", high = 179.9, of =' in line
     wanted = "[requirements]\nasynchrony_max = { max = 9.0, probability = 95, confidence = 0.9 }"
     path.write_text(f"{CAMPAIGN}\n{wanted}\n")
     line = refused("campaign", path, "--dry-run")
@@ -390,11 +400,24 @@ def test_a_refusal_of_a_part_tells_value_and_cure(values: dict[str, object], tex
             "structure.corner_mass=50.0",
             "structure.corner_mass: corners of 1800 kg on rods of 1.287",
         ),
+        ("joints.vjoint.coulomb=5.0", "joints.vjoint.coulomb = 5 N m is above 1 N m: a pin of"),
+        ("joints.pivot.coulomb=1.1", "joints.pivot.coulomb = 1.1 N m is above 1 N m"),
+        ("record.stress=true limits.rod_stress=1.0", "limits.rod_stress = 1 Pa is below 1e+06 Pa"),
+        (
+            "record.stress=true limits.rod_stress=3e10",
+            "limits.rod_stress = 3e+10 Pa is above 1e+10 Pa",
+        ),
+        # E = 0.1 MPa on tubes of 10 x 9.15 mm, 12.79 mm^2.
+        (
+            "rods.young_modulus=1e5 rods.bar_young_modulus=120e9",
+            "rods: the axial stiffness E A of the diagonals is 1.28 N, below 1000 N",
+        ),
     ],
 )
 def test_values_that_nobody_means_are_told_and_not_refused(value: str, words: str) -> None:
     """Half a bar of ring18 has 0.289 m, its rods weigh 1.287 kg; a scene as it is has none."""
-    for more in ([], ["--set", value]):
+    settings = [word for each in value.split() for word in ("--set", each)]
+    for more in ([], settings):
         told = CliRunner().invoke(cli, ["check", "ring18-motor", *more])
         assert told.exit_code == 0, told.output
         lines = [line for line in told.output.splitlines() if line.startswith("doubtful: ")]

@@ -36,7 +36,7 @@ from ringsim.plots.campaign.frame import (
     of_cases,
     shown_until,
 )
-from ringsim.plots.drives_and_locks import least_rate, standard_of, stop_times
+from ringsim.plots.drives_and_locks import drive_end, least_rate, standard_of
 from ringsim.plots.registry import picture
 from ringsim.tables import counted as number_of
 
@@ -174,7 +174,7 @@ _ANGLES = 161
 )  # fmt: skip
 def margin(campaign: xr.Dataset) -> Figure:
     """``least_drive_margin`` (sample) by ending; below, ``drive_margin`` (sample, time) over the
-    mean opening angle, as long as no winch has stopped: see ``stop_times``.
+    mean opening angle, until the last winch has stopped: see ``drive_end``.
     """
     figure = Figure(figsize=(8.6, 6.2))
     upper, lower = figure.subplots(2, 1, height_ratios=(2, 3))
@@ -183,9 +183,8 @@ def margin(campaign: xr.Dataset) -> Figure:
     read, words = chosen(campaign, ["drive_margin", "opening_angle"])
     angles = read["opening_angle"].mean(("plane", "section")).transpose("sample", "time").to_numpy()
     margins = read["drive_margin"].transpose("sample", "time")
-    stops = stop_times(campaign.sel(sample=read["sample"])).values()
-    first = np.min(np.broadcast_arrays(np.full(len(words), np.inf), *stops), axis=0)
-    after = margins.notnull() & (read["time"] >= xr.DataArray(first, dims="sample"))
+    last = np.broadcast_to(drive_end(campaign.sel(sample=read["sample"])), len(words))
+    after = margins.notnull() & (read["time"] >= xr.DataArray(last, dims="sample"))
     rows = [_over_angle(*each) for each in zip(angles, margins.where(~after).values, strict=True)]
     grid = angle_grid(rows)
     laid = np.array([laid_on(grid, *row) for row in rows])
@@ -197,8 +196,8 @@ def margin(campaign: xr.Dataset) -> Figure:
     note = f"{counted(campaign, words)} Dotted: the margin of 0 that the standard requires."
     if cut := int(after.any("time").sum()):
         note += (
-            f" Curves end where a winch stops, in {number_of(cut, 'sample')}: it holds its "
-            "plane, and there is no margin any more."
+            f" Curves end where the last winch stops, in {number_of(cut, 'sample')}: nobody "
+            "drives any more."
         )
     head(figure, campaign, "Drive margin", note)
     return figure

@@ -23,7 +23,16 @@ from ringsim.analysis.design import (
     scalars,
     values_of,
 )
-from ringsim.analysis.intervals import good, is_moment, quantities, tells_of, used, varies
+from ringsim.analysis.intervals import (
+    ALIKE,
+    good,
+    hardly_apart,
+    is_moment,
+    quantities,
+    tells_of,
+    used,
+    varies,
+)
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import losses, one_at_a_time
 from ringsim.outputs.family import VARIABLES, Array
@@ -107,9 +116,6 @@ def at_or_below(campaign: xr.Dataset, name: str) -> tuple[Array, Array]:
 
 MOST_PANELS = 9
 """Of a sheet: more could not be read."""
-APART = 1e-3
-"""Range of a number over its size below which a panel of its own shows nothing: no digit of it that
-tables give changes."""
 
 
 def drawable(campaign: xr.Dataset) -> list[str]:
@@ -158,11 +164,11 @@ def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
     known = {name: values_of(campaign, name)[1] for name in names if name not in limited}
     flat = [
         name for name, values in known.items() if len(values) > 1
-        and (np.ptp(values) < APART * np.abs(values).max() or not varies(campaign, name))
+        and (hardly_apart(values.min(), values.max()) or not varies(campaign, name))
     ]  # fmt: skip
     if not flat or len(flat) == len(names):
         return [], ""
-    within = f"by less than {100 * APART:g} %, or than their numerical error"
+    within = f"by less than {100 * ALIKE:g} %, or than their numerical error"
     return flat, f" Not drawn, because samples differ {within}: {', '.join(flat)}."
 
 
