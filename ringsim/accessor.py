@@ -214,8 +214,9 @@ class Ring:
     def fan(self, quantiles: tuple[float, ...] = (0.0, 0.05, 0.5, 0.95, 1.0)) -> xr.DataArray:
         """Quantiles over the samples of each V-joint's deviation from the mean opening angle.
 
-        Along (quantile, plane, section, time), degree.  After its end a run that deployed counts as
-        in step, any other with the deviation of its last record.
+        Along (quantile, plane, section, time), degree, of one time each: where samples lag in turn
+        their median is nearly zero, which no sample has; figures show a sample.  After its end a
+        run that deployed counts as in step, any other with the deviation of its last record.
 
         InputError if it is no campaign, or no sample has recorded opening angles.
         """

@@ -308,15 +308,19 @@ def lines(found: xr.Dataset, title: str) -> list[str]:
             rows = [[_BOLD.sub(r"\1 *", str(cell)) for cell in row] for row in each.rows]
             told += Table(each.head, rows).lines()
         else:
-            told += textwrap.wrap(each, _WIDTH) if "\n" not in each else each.splitlines()
-    return [line.replace("`", "") for line in told]
+            # An override stays on its line: at what is no blank to textwrap it does not break.
+            for line in re.sub(r"(--\w+) ", "\\1\u00a0", each).splitlines():
+                told += textwrap.wrap(line, _WIDTH, subsequent_indent="  " * line.startswith("- "),
+                                      break_on_hyphens=False, break_long_words=False)  # fmt: skip
+    return [line.replace("`", "").replace("\u00a0", " ") for line in told]
 
 
 def _parts(found: xr.Dataset) -> list[str | Table]:
     """Texts and tables in their order."""
     single = found.drop_sel(output=list(GROUPS), errors="ignore")
     parts: list[str | Table] = [*filter(None, [found.attrs.get("remarks")])]
-    parts += [_ADVICE, _advice(found), _COSTS, _errors(single)]
+    advised, letters = _advice(found)
+    parts += [_ADVICE, advised, *filter(None, [letters]), _COSTS, _errors(single)]
     parts += [_ORDERS, _orders(single)]
     if "engines_differ" in found:
         parts += [_ENGINES, _engines_text(single)]
@@ -338,19 +342,27 @@ def in_words(found: xr.Dataset, rung: int) -> str:
     return " ".join(words) or STANDING
 
 
-def _advice(found: xr.Dataset) -> Table:
-    targets, rows = found.target.values.tolist(), []
+def _advice(found: xr.Dataset) -> tuple[Table, str]:
+    """The cheapest setting for each error by its letter, and what the letters are: in the table
+    itself overrides would take five lines of a terminal.
+    """
+    targets, rows, letters = found.target.values.tolist(), [], dict[str, str]()
     for name, column in zip(_names(found), found.output, strict=True):
         of = found.sel(output=column)
         rows.append([name])
         for target, cheapest in zip(targets, of.cheapest.values, strict=True):
-            least = float(of.bound.where(of.eligible).min())
-            otherwise = f"none tried: {least:.2g} at best"
-            if of.uncertainty >= target:
-                otherwise = "reference too coarse"
-            words = f"{in_words(of, cheapest)}, {of.cost.values[cheapest]:.3g} s"
-            rows[-1].append(words if cheapest >= 0 else otherwise)
-    return Table(["error of", *(f"{target:g}" for target in targets)], rows)
+            if cheapest < 0:
+                least = float(of.bound.where(of.eligible).min())
+                coarse = of.uncertainty >= target
+                rows[-1].append(
+                    "reference too coarse" if coarse else f"none tried: {least:.2g} at best"
+                )
+                continue
+            if (word := in_words(of, cheapest)) != STANDING:
+                word = letters.setdefault(word, chr(ord("A") + len(letters)))
+            rows[-1].append(f"{word}, {of.cost.values[cheapest]:.3g} s")
+    table = Table(["error of", *(f"{target:g}" for target in targets)], rows)
+    return table, "\n".join(f"- {letter}: {words}" for words, letter in letters.items())
 
 
 def _errors(found: xr.Dataset) -> Table:

@@ -32,17 +32,16 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Courses:
-    """Quantiles over the samples of each section's deviation from the mean opening angle."""
+    """Quantiles over the samples of each section's deviation from the mean opening angle.
+
+    They are of one time each: where samples are late in turn, each for a while, their median is
+    nearly zero, which no sample has.
+    """
 
     bands: xr.DataArray
     """Shape (quantile, plane, section, time), degree."""
     samples: Places
     """Samples whose numbers hold and that were recorded."""
-
-    @property
-    def median(self) -> xr.DataArray:
-        """The middle one, (plane, section, time)."""
-        return self.bands.sel(quantile=0.5)
 
 
 def deployed(campaign: xr.Dataset) -> Mask:

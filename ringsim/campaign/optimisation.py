@@ -393,8 +393,8 @@ def run_optimisation(
     """Run all campaigns that are missing, on all ranks of an MPI world or with so many workers, and
     write what was found into the folder ``out`` (runs/NAME).  How it ended, and the file.
 
-    ``given`` is called on rank 0.  The same call goes on
-    with one that was interrupted, to the same result.
+    ``given`` is called on rank 0.  The same call goes on with one that was interrupted, to the same
+    result.
     """
     courses = list[_Course]()
 

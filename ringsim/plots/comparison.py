@@ -11,7 +11,14 @@ from matplotlib.ticker import PercentFormatter
 from ringsim.analysis.comparison import paired
 from ringsim.analysis.comparison_text import differing, names_of
 from ringsim.analysis.courses import deployed, names_of_ends
-from ringsim.analysis.design import blocks, endings, population_of, scalars, values_of
+from ringsim.analysis.design import (
+    blocks,
+    endings,
+    judged_by,
+    median_and_worst,
+    population_of,
+    values_of,
+)
 from ringsim.analysis.intervals import ALIKE, good, hardly_apart, numbers, tells_of, used
 from ringsim.analysis.posterior import UNEXPLAINED
 from ringsim.analysis.residuals import Residuals
@@ -20,8 +27,10 @@ from ringsim.plots import style
 from ringsim.plots.campaign.frame import (
     at_or_below,
     base_of,
+    drawable,
     legend,
     limits,
+    middle_told,
     of_cases,
     shown_until,
 )
@@ -37,7 +46,6 @@ from ringsim.tables import (
 
 _LOOKS = ((style.BLUE, "-"), (style.ORANGE, (0, (5, 1.5))))
 """Colour and dashes of either: dashes tell them apart in grey."""
-_BANDS = (0.05, 0.5, 0.95)
 _WIDE = 40
 """Letters of a title above a panel."""
 _RECORDS = 301
@@ -67,8 +75,8 @@ def _figures(
 ) -> Iterator[tuple[str, str, Figure]]:
     both = population_of(first), population_of(second)
     if "sample" in first.dims:
-        known = [set(scalars(each)) for each in both]
-        every = [n for n in differing(found) if all(n in each for each in known)]
+        known = {name for each in both for name in drawable(each)}
+        every = [n for n in differing(found) if n in known]
         names = [n for n in every if not _still(both, n)] or every
         unmoved = [n for n in every if n not in names]
         if names and found.attrs["pairs"]:
@@ -184,18 +192,21 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
 
 @style.styled
 def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Array]]]) -> Figure:
-    """A panel a quantity over time: of runs their course, of campaigns the median with a band from
-    5 to 95 % of all samples, or the base case with the range of all cases, also of those that are
-    over; ``read`` has times and rows of both by quantity.
+    """A panel a quantity over time: of runs their course, of campaigns that of the sample whose
+    asynchrony is the median, or of the base case, with the range of all samples, also of those that
+    are over; ``read`` has times and rows of both by quantity.
     """
     single = "sample" not in both[0].dims
+    lines = [None if single else _line_of(each) for each in both]
+    names = [
+        called if sample is None else f"{called}, line: sample {sample}"
+        for called, sample in zip(names_of(found), lines, strict=True)
+    ]
     figure = Figure(figsize=(8.2, 2.3 * len(read) + 1.2))
     grid = figure.subplots(len(read), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (name, rows_of) in zip(grid, read.items(), strict=True):
         drawn = []
-        for (time, rows), called, (colour, dashes) in zip(
-            rows_of, names_of(found), _LOOKS, strict=True
-        ):
+        for (time, rows), called, (colour, dashes) in zip(rows_of, names, _LOOKS, strict=True):
             drawn.append(rows)
             if len(rows) > 1:
                 axes.fill_between(time, rows[0], rows[-1], color=colour, alpha=0.2, linewidth=0.0)
@@ -211,7 +222,7 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
     if not single:
-        told = dict.fromkeys(_BANDS_OF[of_cases(each)] for each in both)
+        told = dict.fromkeys(map(_bands_told, both))
         cut = [
             f"{called}: {ran_on.partition(': ')[2]}"
             for each, called in zip(both, names_of(found), strict=True)
@@ -222,11 +233,24 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
     return figure
 
 
-_BANDS_OF = {
-    False: "Lines are medians, bands 5 to 95 % of all samples.",
-    True: "Lines are the base case, if there is one; bands span all samples.",
-}
-"""By whether samples are cases that stand for no population."""
+def _line_of(campaign: xr.Dataset) -> int | None:
+    """The sample whose courses are drawn: the base case of cases, else that in the middle."""
+    if of_cases(campaign):
+        return base_of(campaign)
+    # Medians at each time would be of no sample, and lie far below all that lag late in turn.
+    chosen = median_and_worst(campaign)
+    return None if chosen is None else chosen[0]
+
+
+def _bands_told(campaign: xr.Dataset) -> str:
+    """What is drawn of a campaign."""
+    if of_cases(campaign):
+        return "Lines are the base case, if there is one; bands span all samples."
+    if not judged_by(campaign):
+        return "Bands span all samples."
+    return f"Each line is {middle_told(campaign, 'its campaign')};\nbands span all samples."
+
+
 _OVER = (
     "After its end a run counts on: a deployed ring with 180 deg and in step, everything else\n"
     "with its last value."
@@ -251,8 +275,8 @@ def _last(dataset: xr.Dataset) -> float:
 
 
 def _course(dataset: xr.Dataset, name: str, until: float) -> tuple[Array, Array]:
-    """Times and rows of a quantity up to a time (s), (quantile, time): of a run itself, of a
-    campaign ``_BANDS``, or of cases the least, the base case and the largest.
+    """Times and rows of a quantity up to a time (s): of a run itself, of a campaign the least, that
+    of the sample whose line is drawn, and the largest.
     """
     time = dataset["time"].to_numpy()
     last = int(np.clip(np.searchsorted(time, until), 1, len(time) - 1))
@@ -260,18 +284,17 @@ def _course(dataset: xr.Dataset, name: str, until: float) -> tuple[Array, Array]
     if "sample" not in dataset.dims:
         return time[at], _over_places(dataset[name], name).isel(time=at).to_numpy()[None]
     about = [each for each in ("status", "deployment_time") if each in dataset]
-    parts = [
-        _held(used(block), name)[:, at]
-        for block in blocks(dataset, [name, *about, *names_of_ends(dataset)])
-    ]
-    held = np.concatenate(parts)
-    rows = np.full((len(_BANDS), len(at)), np.nan)
+    parts, samples = [], [np.empty(0, dtype=np.int64)]
+    for block in blocks(dataset, [name, *about, *names_of_ends(dataset)]):
+        own = used(block)
+        parts.append(_held(own, name)[:, at])
+        samples.append(own["sample"].to_numpy())
+    held, kept = np.concatenate(parts), np.concatenate(samples)
+    rows = np.full((3, len(at)), np.nan)
     known = np.isfinite(held).any(axis=0)
-    if not of_cases(dataset):
-        rows[:, known] = np.nanquantile(held[:, known], _BANDS, axis=0)
-    else:
-        rows[::2, known] = np.nanquantile(held[:, known], [0.0, 1.0], axis=0)
-        rows[1] = held[0] if base_of(dataset) == 0 else np.nan
+    rows[0, known], rows[2, known] = np.nanmin(held[:, known], 0), np.nanmax(held[:, known], 0)
+    if (line := held[kept == _line_of(dataset)]).size:
+        rows[1] = line[0]
     return time[at], rows
 
 

@@ -363,8 +363,10 @@ def pulleys(dataset: xr.Dataset) -> Figure:
     known = ratio.values[np.isfinite(ratio.values)]
     for axes in grid[:, 0]:
         axes.set_ylabel("Tension behind\nover before")
-    low = float(known.min()) if known.size else 0.0
-    grid[0, 0].set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.1 * (1.0 - low))
+    # Above 1 where rope runs away from the winch.
+    low, high = (float(known.min()), max(1.0, float(known.max()))) if known.size else (0.0, 1.0)
+    air = 0.1 * (high - low)
+    grid[0, 0].set_ylim(low - air, high + air)
     lines = grid[0, 0].get_legend_handles_labels()[0]
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
     style.head(figure, grid[0, 0], dataset, "Pulleys")

@@ -230,7 +230,8 @@ def front(found: xr.Dataset) -> Figure:
         wide = np.abs(np.array([[low[k, 1]], [high[k, 1]]]) - middle[k, 1]) if two else None
         left.errorbar(x, middle[k, 0], yerr=ends, xerr=wide, fmt="s" if k == 0 else "D",
                       color=colour, markersize=5, capsize=3)  # fmt: skip
-        left.annotate(name, (x, middle[k, 0]), textcoords="offset points", xytext=(6, 5),
+        left.annotate(name, (x, middle[k, 0]), textcoords="offset points",
+                      xytext=(0, 9 if k else -15), ha="center",
                       fontsize=8.5, color=colour)  # fmt: skip
     objectives = [str(name) for name in found["objective"].values]
     left.set_ylabel(unit_behind(objectives[0], units[0]))

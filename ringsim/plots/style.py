@@ -6,7 +6,7 @@ import io
 import math
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
@@ -118,13 +118,19 @@ styled = matplotlib.style.context(Path(__file__).with_name("figures.mplstyle"))
 
 
 def new_panels(
-    count: int, width: float, height: float, legend: float, *, sharex: bool = False, most: int = 3
-) -> tuple[Figure, list[Axes], int]:
-    """A figure of ``count`` panels, ``most`` in a row, and its number of columns; sizes in inch."""
+    count: int, width: float, height: float | Sequence[float], more: float, *,
+    sharex: bool = False, most: int = 3,
+) -> tuple[Figure, list[Axes], int]:  # fmt: skip
+    """A figure of ``count`` panels, ``most`` in a row, and its number of columns; sizes in inch,
+    ``height`` of all rows or of each, ``more`` of what stands beside them.
+    """
     columns = min(most, count)
     rows = -(-count // columns)
-    figure = Figure(figsize=(width * columns, height * rows + legend))
-    panels = figure.subplots(rows, columns, sharex=sharex, squeeze=False).ravel().tolist()
+    heights = [height] * rows if isinstance(height, float) else height
+    figure = Figure(figsize=(width * columns, sum(heights) + more))
+    panels = figure.subplots(
+        rows, columns, sharex=sharex, squeeze=False, height_ratios=heights
+    ).ravel().tolist()  # fmt: skip
     for panel in panels[count:]:
         panel.set_visible(False)
     return figure, panels[:count], columns

@@ -192,6 +192,21 @@ def test_a_terminal_has_the_same_tables_without_marks_of_markdown(study: xr.Data
     assert "--set solver.tolerance=0.001" in told
 
 
+def test_what_is_advised_fits_a_terminal_with_its_overrides_below(study: xr.Dataset) -> None:
+    told = lines(study, "A study")
+    start = next(k for k, line in enumerate(told) if line.startswith("error of"))
+    advised = told[start : next(k for k, line in enumerate(told) if "Errors of all" in line)]
+    assert max(map(len, advised)) <= 100
+    named = {line[2]: line[5:] for line in advised if line.startswith("- ")}
+    cells = {cell for line in advised for cell in re.findall(r"\b([A-Z]), [\d.]+ s", line)}
+    assert cells == named.keys()
+    for column in study.output:
+        for rung in study.cheapest.sel(output=column).values:
+            if rung >= 0 and (words := in_words(study, rung).replace("`", "")) != "as it stands":
+                assert any(words.startswith(each.split(" --")[0]) for each in named.values()), words
+    assert not [line for line in advised if line.rstrip().endswith("--set")]
+
+
 def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tmp_path) -> None:
     evidence = evidence_of(study)
     file = tmp_path / "settings.toml"

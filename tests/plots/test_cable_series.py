@@ -62,3 +62,14 @@ def test_curves_that_lie_on_each_other_are_both_seen() -> None:
         for line in second:
             assert line.get_linestyle() == "--"
             assert line.get_linewidth() < vertex.get_linewidth()
+
+
+def test_ratios_above_one_stay_within_their_panels() -> None:
+    """Rope runs away from the winch where a section behind it locks first."""
+    run = ran()
+    ratio = 0.0 * run["pulley_ratio"] + 0.9
+    for most in (1.012, 0.9):
+        figure = pulleys(run.assign(pulley_ratio=ratio.where(run["time"] > run["time"][2], most)))
+        low, high = figure.axes[0].get_ylim()
+        assert low < 0.9
+        assert high > max(most, 1.0)

@@ -11,10 +11,13 @@ from matplotlib.lines import Line2D
 
 from ringsim.analysis import courses as courses_module
 from ringsim.analysis import design as blocks_module
+from ringsim.analysis.comparison import compare
 from ringsim.analysis.courses import course, courses
+from ringsim.analysis.design import median_and_worst
 from ringsim.plots.campaign.courses import fan, lag_map
 from ringsim.plots.campaign.endings import base_load, motors
 from ringsim.plots.campaign.frame import shown_until
+from ringsim.plots.comparison import figures_of_both
 
 GOOD = [0, 1, 3, 4, 6]
 
@@ -28,32 +31,38 @@ def legend_of(figure: Figure) -> str:
     return " ".join(text.get_text() for each in figure.legends for text in each.get_texts())
 
 
+def caption(figure: Figure) -> str:
+    below = [figure.get_supxlabel(), *(each.get_title().get_text() for each in figure.legends)]
+    return " ".join(" ".join(below).split())
+
+
 def deviation(campaign: xr.Dataset) -> np.ndarray:
     """By numpy alone, of the samples that count; every run ends at the last record."""
     angle = campaign["opening_angle"].transpose("sample", "plane", "section", "time").values[GOOD]
     return angle - angle.mean(axis=(1, 2), keepdims=True)
 
 
-def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
+def test_the_fan_shows_the_range_and_the_median_sample(mixed: xr.Dataset) -> None:
     figure, wanted = fan(mixed), deviation(mixed)
+    assert median_and_worst(mixed) == (3, 6)
     for (plane, section), axes in zip(np.ndindex(2, SECTIONS), figure.axes, strict=True):
         (line,) = (line for line in axes.lines if line.get_label() == "median")
         np.testing.assert_allclose(line.get_xdata(), TIMES, atol=1e-12)
-        expected = np.median(wanted[:, plane, section], axis=0)
+        expected = wanted[GOOD.index(3), plane, section]
         np.testing.assert_allclose(line.get_ydata(), expected, atol=1e-5)
-        every, most = axes.collections
-        for band, levels in ((every, (0.0, 1.0)), (most, (0.05, 0.95))):
-            low, high = np.quantile(wanted[:, plane, section], levels, axis=0)
-            drawn_at = band.get_paths()[0].vertices[:, 1]
-            assert drawn_at.min() == pytest.approx(low.min(), abs=1e-5)
-            assert drawn_at.max() == pytest.approx(high.max(), abs=1e-5)
+        (band,) = axes.collections
+        drawn_at = band.get_paths()[0].vertices[:, 1]
+        assert drawn_at.min() == pytest.approx(wanted[:, plane, section].min(), abs=1e-5)
+        assert drawn_at.max() == pytest.approx(wanted[:, plane, section].max(), abs=1e-5)
         (worst,) = (line for line in axes.lines if line.get_label() != "median")
         largest = np.abs(worst.get_ydata()).max()
         assert largest == pytest.approx(np.abs(lags(6)[plane, section]), abs=1e-5)
-    assert "worst: sample 6" in legend_of(figure)
+    assert legend_of(figure) == "all samples median: sample 3 worst: sample 6"
+    beside = [axes.get_ylabel() for axes in figure.axes[::SECTIONS]]
+    assert beside == ["upper\nplane", "lower\nplane"]
     lines = [each for each in figure.legends[0].legend_handles if isinstance(each, Line2D)]
     dashed = {each.get_label(): each.get_linestyle() for each in lines}
-    assert dashed["worst: sample 6"] != dashed["median"]
+    assert dashed["worst: sample 6"] != dashed["median: sample 3"]
     assert figure.axes[-1].get_xlabel().startswith("Time since")
     figure.draw_without_rendering()
     box = figure.legends[0].get_window_extent()
@@ -145,11 +154,68 @@ def test_quantiles_do_not_depend_on_how_the_file_is_read(monkeypatch: pytest.Mon
     np.testing.assert_allclose(parts.bands, expected, atol=1e-5)
 
 
+def late_in_turn() -> xr.Dataset:
+    """Seven rings whose planes are apart by about 8 deg for half a second, each a second after the
+    one before: at each time six of them are in step.
+    """
+    campaign = made_campaign(7)
+    sizes = np.array([8.3, 8.1, 8.0, 8.6, 8.2, 8.5, 8.4])  # the median is that of sample 0
+    apart = np.zeros((7, len(TIMES)))
+    apart[np.arange(7), 4 + 2 * np.arange(7)] = sizes
+    about = xr.DataArray([0.5, -0.5], dims="plane") * xr.DataArray(apart, dims=("sample", "time"))
+    mean = campaign["opening_angle"].mean(("plane", "section"))
+    for name, values in (("opening_angle", mean + about), ("asynchrony", abs(about).sum("plane"))):
+        like = campaign[name]
+        campaign[name] = values.broadcast_like(like).transpose(*like.dims).assign_attrs(like.attrs)
+    campaign["asynchrony_max"][:] = sizes
+    return campaign
+
+
+def test_curves_of_samples_that_lag_in_turn_are_of_a_sample_not_of_an_instant() -> None:
+    """The median at each time would be zero, though each ring lags by more than 4 deg."""
+    campaign = late_in_turn()
+    assert float(courses(campaign).bands.sel(quantile=0.5).max()) == pytest.approx(0.0, abs=1e-5)
+    assert median_and_worst(campaign) == (0, 3)
+    figure = fan(campaign)
+    (line,) = (line for line in figure.axes[0].lines if line.get_label() == "median")
+    assert line.get_ydata().max() == pytest.approx(4.15, abs=1e-5)
+    assert "Median: the sample whose asynchrony_max is the median of all." in caption(figure)
+    images = [axes.collections[0].get_array() for axes in lag_map(campaign).axes[:2]]
+    assert [float(each.max()) for each in images] == pytest.approx([4.15, 4.3], abs=1e-5)
+    other = late_in_turn()
+    other["asynchrony"] *= 2.0
+    other["asynchrony_max"] *= 2.0
+    found = compare(campaign, other, ("slow", "fast"))
+    (both,) = (f for name, _, f in figures_of_both(found, campaign, other) if name == "courses")
+    axes = both.axes[1]
+    assert [line.get_ydata().max() for line in axes.lines] == pytest.approx([8.3, 16.6])
+    assert [line.get_label() for line in axes.lines] == [
+        "slow, line: sample 0", "fast, line: sample 0",
+    ]  # fmt: skip
+    edges = [band.get_paths()[0].vertices[:, 1].max() for band in axes.collections]
+    assert edges == pytest.approx([8.6, 17.2])
+    assert "asynchrony_max is the median of its campaign; bands span all samples" in caption(both)
+
+
+def test_courses_by_ending_are_of_its_median_sample() -> None:
+    """Of rings 0 to 4 sample 2 is in the middle, of those that stall, 5 to 7, sample 6."""
+    campaign = with_motors(made_campaign(8, stalled=(5, 6, 7)))
+    for draw, size in ((motors, 1e-3), (base_load, 1.0)):
+        figure = draw(campaign)
+        first, second = figure.axes[0].lines
+        assert first.get_label() == "deployed (5), line: sample 2"
+        assert second.get_label() == "stalled (3), line: sample 6"
+        offset = 1.0 if draw is motors else 3.0
+        assert first.get_ydata()[0] == pytest.approx(size * (offset + 2.0))
+        assert second.get_ydata()[0] == pytest.approx(size * (offset + 6.0))
+        assert "the line is the sample whose asynchrony_max is the median" in caption(figure)
+
+
 def test_the_map_shows_the_median_and_the_worst(mixed: xr.Dataset) -> None:
     figure, wanted = lag_map(mixed), deviation(mixed)
     upper, lower = figure.axes[:2], figure.axes[2:4]
     for plane, pair in enumerate((upper, lower)):
-        for axes, values in zip(pair, (np.median(wanted, axis=0), wanted[-1]), strict=True):
+        for axes, values in zip(pair, (wanted[GOOD.index(3)], wanted[-1]), strict=True):
             image = axes.collections[0].get_array().reshape(SECTIONS, -1)
             np.testing.assert_allclose(image, values[plane], atol=1e-5)
     scales = [axes.collections[0].get_clim() for axes in (*upper, *lower)]
@@ -169,10 +235,7 @@ def test_one_sample_that_runs_on_does_not_squeeze_all_others() -> None:
     assert told == f" Time ends at {until:.3g} s: 1 sample goes on, until 10 s."
     for draw in (fan, lag_map, motors, base_load):
         figure = draw(campaign)
-        below = figure.get_supxlabel() + "".join(
-            each.get_title().get_text() for each in figure.legends
-        )
-        assert told.strip() in " ".join(below.split()), draw
+        assert told.strip() in caption(figure), draw
         ends = [a.get_xlim()[1] for a in figure.axes if "Time since" in a.get_xlabel()]
         assert ends
         assert all(until - 0.5 <= end <= until for end in ends), draw

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ringsim.analysis import design as blocks_module
-from ringsim.analysis.design import median_and_worst
+from ringsim.analysis.design import median_and_worst, scalars
 from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
@@ -26,7 +26,7 @@ from ringsim.plots.campaign.courses import lock_order, shares
 from ringsim.plots.campaign.endings import angle_grid, base_load, laid_on, margin, motors, tension
 from ringsim.plots.campaign.frame import moves, shown
 from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
-from ringsim.plots.campaign.tornado import named, one_by_one
+from ringsim.plots.campaign.tornado import bars_of, named, one_by_one
 from ringsim.plots.figures import PICTURES, draw_figures, figures_of
 from ringsim.variables import Fate
 
@@ -266,8 +266,8 @@ def test_motors_and_base_are_drawn_by_ending() -> None:
     assert [a.get_title(loc="left") for a in torques] == ["upper cable", "lower cable"]
     for axes in torques:
         lines = {line.get_label(): line.get_ydata() for line in axes.lines}
-        np.testing.assert_allclose(lines["stalled (2)"], 6e-3)
-        np.testing.assert_allclose(lines["deployed (5)"], 4e-3)
+        np.testing.assert_allclose(lines["stalled (2), line: sample 4"], 5e-3)
+        np.testing.assert_allclose(lines["deployed (5), line: sample 3"], 4e-3)
     force, torque = base_load(campaign).axes
     for axes, scale in ((force, 1.0), (torque, 0.5)):
         np.testing.assert_allclose(axes.lines[0].get_ydata(), 6.0 * scale)
@@ -420,6 +420,26 @@ def test_a_percentage_stays_on_its_line(mixed: xr.Dataset) -> None:
         figure = Figure(figsize=(8.0, 4.0))
         frame.head(figure, mixed, "Any", f"{'x' * length} by less than 0.1 % of it " + "y " * 80)
         assert not [line for line in figure.get_supxlabel().split("\n") if line.startswith("%")]
+
+
+def test_of_too_many_numbers_those_that_differ_most_are_drawn_also_without_a_summary() -> None:
+    campaign = made_campaign(8)
+    about = {"min": 1.0, "probability": 0.9, "confidence": 0.9}
+    every = [n for n, each in VARIABLES.items() if each.summary is not None and each.dtype == "f8"]
+    for k, name in enumerate(every):
+        campaign[name] = "sample", 100.0 + (k + 1.0) * np.arange(8.0)
+    every = scalars(campaign)  # without numerical errors
+    campaign["longest_slack"] = "sample", np.arange(8.0)  # has no line in summaries
+    asked = dict.fromkeys(every[:3], about)
+    campaign.attrs["requirements"] = json.dumps(asked)
+    names, told = shown(campaign)
+    assert names == [*every[:3], *every[-5:], "longest_slack"]
+    assert told == f" Not drawn for want of room: {', '.join(every[3:-5])}."
+    assert "longest_slack" in dict(bars_of(campaign))
+    # Panels that stand beside those of requirements fill the last row.
+    for count in (4, 7, 8):
+        campaign.attrs["requirements"] = json.dumps(dict.fromkeys(every[:count], about))
+        assert all(axes.get_visible() for axes in convergence(campaign).axes), count
 
 
 def test_a_sheet_has_the_panels_that_matter_and_names_the_others() -> None:

@@ -175,8 +175,8 @@ def test_a_ring_whose_latches_missed_is_not_over_when_it_came_to_180_degrees() -
     assert np.isnan(locked_time(run))
     assert motors_of_samples(made.drop_vars("outcome")).axes
     lines = {line.get_label(): line for line in motors_of_samples(made).axes[0].lines}
-    assert lines["deployed (2)"].get_xdata()[-1] == 4.0
-    assert lines["not latched (1)"].get_xdata()[-1] == 9.0
+    assert lines["deployed (2), line: sample 0"].get_xdata()[-1] == 4.0
+    assert lines["not latched (1), line: sample 1"].get_xdata()[-1] == 9.0
     over = xr.DataArray(ends(made), dims="sample")
     made["opening_angle"] = made["opening_angle"].where(made["time"] <= over)
     held = courses(made, (0.0, 1.0)).bands.sel(time=8.0)

@@ -207,3 +207,24 @@ def test_what_has_no_partial_correlation_has_its_plain_one_beside_the_index() ->
     (axes,) = (a for a in figure.axes if a.get_title(loc="left").startswith("Largest tension"))
     (drawn,) = (c for c in axes.containers if c.get_label() == "rank correlation")
     assert drawn.patches[place].get_width() == pytest.approx(bars.plain[place])
+    assert axes.get_xlabel().startswith(
+        "First-order index, and partial rank correlation or rank correlation"
+    )
+
+
+def test_rows_are_as_high_as_their_bars_and_tell_once_what_is_alike() -> None:
+    """Of three panels two have one bar and one has two: bars are of one height on paper."""
+    design = RandomDesign(samples=200)
+    campaign = made(design)
+    force, modulus = (campaign[name].values for name in FACTORS)
+    campaign["deployment_time"] = "sample", 30.0 + force
+    campaign["peak_rod_stress"] = "sample", 2.0 + modulus
+    figure = tornado(campaign)
+    figure.draw_without_rendering()
+    drawn = [axes for axes in figure.axes if axes.get_visible()]
+    assert sorted(len(axes.get_yticks()) for axes in drawn) == [1, 1, 2]
+    sizes = [axes.patches[0].get_window_extent().height for axes in drawn]
+    assert sizes == pytest.approx([sizes[0]] * 3, rel=0.02)
+    assert not any("used" in axes.get_xlabel() for axes in drawn)
+    told = " ".join(figure.legends[0].get_title().get_text().split())
+    assert "Samples: 200 used, 0 left out in each panel." in told

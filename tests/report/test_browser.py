@@ -111,6 +111,8 @@ def test_the_page_plays_offline(
 
 PRINT = """<script>
 dispatchEvent(new Event("beforeprint"));
+document.body.dataset.folded = [...document.querySelectorAll("details:not([open])")]
+  .map(each => each.firstElementChild.textContent).join("|");
 document.body.dataset.told = document.getElementById("told").textContent;
 dispatchEvent(new Event("afterprint"));
 document.body.dataset.after = document.getElementById("told").textContent;
@@ -131,6 +133,9 @@ def test_a_print_has_three_moments_for_the_player(
     )  # fmt: skip
     told = re.search(r'data-told="([^"]*)"', done.stdout)
     assert told is not None
+    folded = re.search(r'data-folded="([^"]*)"', done.stdout)
+    assert folded is not None
+    assert set(folded[1].split("|")) == {"At length"}  # as the page says
     assert re.match(r"sample \d+: .* at 0\.00 s, .* at \d.* s, .* at 10\.00 s\.$", told[1])
     after = re.search(r'data-after="([^"]*)"', done.stdout)
     assert after is not None

@@ -23,6 +23,7 @@ from ringsim.plots.campaign.frame import (
     legend,
     lines_told,
     looks_of_cases,
+    middle_told,
     of_cases,
     shown_until,
 )
@@ -31,12 +32,12 @@ from ringsim.plots.run import LEAST_SPAN
 
 _NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")
 """Asynchrony first: without a value of it there is nothing to draw."""
-_LOOKS = ((style.BLUE, "solid", 1.9), (style.ORANGE, (0, (3, 1.5)), 1.2))
-"""Colour, dashes and width of each plane's median: alike ones are both seen, one on the other."""
+_LOOKS = style.BLUE, style.VERMILLION
+"""Colour of each plane, dark enough for print in grey; words beside its panels name it."""
 _WORST: dict[str, Any] = {
     "color": style.INK, "linewidth": 1.0, "linestyle": (0, (6, 1.2, 1, 1.2)),
 }  # fmt: skip
-"""The worst sample: dashes like those of no median, also in grey."""
+"""The worst sample: dashes like those of no plane, also in grey."""
 _WIDEST = 6
 _MOST_CASES = 60
 """Lines of a panel at most."""
@@ -47,17 +48,18 @@ _MOST_CASES = 60
     _NEEDS, judged_by, courses,
 )  # fmt: skip
 def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
-    """A panel a section and plane, one below the other: median, 5-95 % and 0-100 % of its
-    deviation, or that of each sample where they are cases, all with one scale.
+    """A panel a section and plane, one below the other: the deviations of the samples whose
+    asynchrony is the median and the largest, and the range of all, or each sample where they are
+    cases, with one scale.
 
-    ``campaign`` has ``opening_angle`` (sample, plane, section, time).  The sample with the largest
-    asynchrony is drawn on its own.  ``read`` is what ``courses`` gives, if it is there already.
+    ``campaign`` has ``opening_angle`` (sample, plane, section, time).  ``read`` is what ``courses``
+    gives, if it is there already.
     """
     read, ran_on = _shown(campaign, courses(campaign) if read is None else read)
     found = read.bands
     planes, sections = found["plane"].values.tolist(), found["section"].values.tolist()
     looks = dict(zip(planes, _LOOKS, strict=False))
-    worst, one = _worst(campaign, read)
+    (middle, line), (worst, one) = _median_and_worst(campaign, read)
     cases = _cases(campaign, read, worst)
     columns = min(_WIDEST, len(sections))
     blocks = -(-len(sections) // columns)
@@ -77,20 +79,20 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
             axes.set_visible(False)
             continue
         own = found.sel(plane=plane, section=sections[number])
-        low, lower, middle, upper, high = own.values
-        colour, dashes, width = looks[plane]
+        colour = looks[plane]
         for look, case in cases:
             axes.plot(case["time"], case.sel(plane=plane, section=sections[number]), **look)
         if not cases:
-            for ends, alpha, edge in (((low, high), 0.08, 0.5), ((lower, upper), 0.2, 0.0)):
-                axes.fill_between(own["time"], *ends, facecolor=(colour, alpha), linewidth=edge,
-                                  edgecolor=colour)  # fmt: skip
-            axes.plot(own["time"], middle, color=colour, linewidth=width, linestyle=dashes,
+            ends = own.sel(quantile=0.0), own.sel(quantile=1.0)
+            axes.fill_between(own["time"], *ends, facecolor=(colour, 0.15), linewidth=0.5,
+                              edgecolor=colour)  # fmt: skip
+        if line is not None and not cases:
+            axes.plot(line["time"], line.sel(plane=plane, section=sections[number]), color=colour,
                       label="median", zorder=4)  # fmt: skip
         if one is not None:
             single = one.sel(plane=plane, section=sections[number])
             axes.plot(single["time"], single, zorder=3, **_WORST)
-        if cases and not column:
+        if not column:
             axes.set_ylabel(f"{plane}\nplane", fontsize=8)
         if plane == planes[0]:
             axes.set_title(f"section {sections[number]}", fontsize=9, pad=3)
@@ -98,27 +100,24 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
             axes.tick_params(labelbottom=True)
             axes.set_xlabel(style.label(found["time"], width=24), fontsize=8)
     figure.supylabel(style.label(found, width=26), fontsize=10)
-    words = [
-        Line2D([], [], color=colour, linestyle=dashes, linewidth=width, label=f"{plane} plane")
-        for plane, (colour, dashes, width) in looks.items()
-    ]
-    shades = (("5-95 %", 0.28, 0.0), ("0-100 %", 0.08, 0.5))
-    bands = [
-        Patch(facecolor=(style.GREY, alpha), edgecolor=style.GREY, linewidth=edge, label=word)
-        for word, alpha, edge in shades
-    ]
-    lines = [Line2D([], [], color=style.GREY, linewidth=1.8, label="median")]
-    if one is not None:
-        lines += [Line2D([], [], label=f"worst: sample {worst}", **_WORST)]
-    handles: list[Line2D | Patch] = [*words, *bands, *lines]
+    words: list[Line2D | Patch] = [
+        Patch(facecolor=(style.GREY, 0.15), edgecolor=style.GREY, linewidth=0.5,
+              label="all samples"),
+    ]  # fmt: skip
+    if line is not None:
+        words.append(Line2D([], [], color=style.GREY, label=f"median: sample {middle}"))
+    lines = [] if one is None else [Line2D([], [], label=f"worst: sample {worst}", **_WORST)]
+    handles: list[Line2D | Patch] = [*words, *lines]
     if cases:
         alike = {look["label"]: look for look, _ in cases}
-        handles = [*(Line2D([], [], **look) for look in alike.values()), *lines[1:]]
+        handles = [*(Line2D([], [], **look) for look in alike.values()), *lines]
     entries(figure, handles, [str(each.get_label()) for each in handles])
     note = "After its end a deployed ring counts as in step, any other keeps its last deviation."
     if cases:
         some = f" {len(cases)} of them are drawn." * (len(cases) < len(read.samples))
         note = f"{(some + lines_told(campaign)).strip()} {note}"
+    elif line is not None:
+        note = f"Median: {middle_told(campaign, 'all')}. {note}"
     note = f"{told(campaign, len(read.samples))}. {note}{ran_on}"
     head(figure, campaign, "Ahead and behind", note)
     return figure
@@ -145,12 +144,19 @@ def _cases(
     ]
 
 
-def _worst(campaign: xr.Dataset, read: Courses) -> tuple[int, xr.DataArray | None]:
-    """The sample with the largest asynchrony and its course; none if that was not recorded."""
-    chosen = median_and_worst(campaign)
-    if chosen is None or chosen[1] not in read.samples:
-        return -1, None
-    return chosen[1], course(campaign, chosen[1], read.bands)
+def _median_and_worst(
+    campaign: xr.Dataset, read: Courses
+) -> tuple[tuple[int, xr.DataArray | None], tuple[int, xr.DataArray | None]]:
+    """The sample whose asynchrony is the median, and that with the largest, with their courses;
+    none of what was not recorded, and one only if both are the same.
+    """
+    found = median_and_worst(campaign)
+    if found is None or found[1] not in read.samples:
+        return (-1, None), (-1, None)
+    middle, worst = found
+    apart = middle != worst and middle in read.samples
+    line = course(campaign, middle, read.bands) if apart else None
+    return (middle, line), (worst, course(campaign, worst, read.bands))
 
 
 def _limits(drawn: list[xr.DataArray]) -> tuple[float, float]:
@@ -162,19 +168,22 @@ def _limits(drawn: list[xr.DataArray]) -> tuple[float, float]:
 
 
 @picture(
-    "campaign", 60, "Lag of each section over time: the median or base case, and the worst sample",
+    "campaign", 60,
+    "Lag of each section over time: the median sample or base case, and the worst sample",
     _NEEDS, judged_by, courses,
 )  # fmt: skip
 def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
-    """Deviation from the mean opening angle as a colour: at each place the median of all samples,
+    """Deviation from the mean opening angle as a colour: the sample whose asynchrony is the median,
     or the base case of single changes, beside the sample with the largest asynchrony, with one
     colour scale.  ``read`` is what ``courses`` gives, if it is there already.
     """
     read, ran_on = _shown(campaign, courses(campaign) if read is None else read)
     found = read.bands
-    worst, one = _worst(campaign, read)
-    columns = [("median of all samples", read.median)]
+    (middle, line), (worst, one) = _median_and_worst(campaign, read)
+    columns = [] if line is None else [(f"median: sample {middle}", line)]
+    note = f" Median: {middle_told(campaign, 'all')}." * bool(columns)
     if of_cases(campaign):
+        note = ""
         base = base_of(campaign)
         known = base in read.samples and base != worst
         columns = [("base case", course(campaign, base or 0, found))] if known else []
@@ -194,7 +203,7 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     bar.set_label(style.label(found, width=30), fontsize=9)
     grid[0, 0].yaxis.set_major_locator(MaxNLocator(10, integer=True, min_n_ticks=1))
     figure.supylabel(style.label(campaign["section"]), fontsize=10.5)
-    head(figure, campaign, "Lag map", f"{told(campaign, len(read.samples))}.{ran_on}")
+    head(figure, campaign, "Lag map", f"{told(campaign, len(read.samples))}.{note}{ran_on}")
     return figure
 
 

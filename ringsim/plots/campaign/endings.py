@@ -1,6 +1,6 @@
 """Courses by how samples ended: bands, margins, motors, base, tensions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,15 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import ends, names_of_ends
-from ringsim.analysis.design import blocks, endings, inputs, paths_of, told, values_of
+from ringsim.analysis.design import (
+    blocks,
+    endings,
+    inputs,
+    judged_by,
+    paths_of,
+    told,
+    values_of,
+)
 from ringsim.analysis.intervals import good, used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
@@ -23,6 +31,8 @@ from ringsim.plots.campaign.frame import (
     lines_told,
     looks_of,
     looks_of_cases,
+    middle_told,
+    middles,
     of_cases,
     shown_until,
 )
@@ -40,9 +50,11 @@ Looks = list[dict[str, Any]]
 
 
 def chosen(campaign: xr.Dataset, names: Sequence[str]) -> tuple[xr.Dataset, NDArray[np.str_]]:
-    """Some variables of up to ``MOST`` samples of each ending that hold, and their endings."""
+    """Some variables of up to ``MOST`` samples of each ending that hold, the one in the middle
+    among them, and their endings.
+    """
     words, ok = endings(campaign), good(campaign)
-    taken = np.zeros(len(words), dtype=bool)
+    taken = np.isin(campaign["sample"].to_numpy(), [*middles(campaign, words).values()])
     for word in set(words[ok].tolist()):
         own = np.flatnonzero(ok & (words == word))
         taken[own[:: -(-len(own) // MOST)]] = True
@@ -54,21 +66,28 @@ def chosen(campaign: xr.Dataset, names: Sequence[str]) -> tuple[xr.Dataset, NDAr
     return xr.concat(parts, "sample", data_vars="all"), words[taken]
 
 
-def counted(campaign: xr.Dataset, words: NDArray[np.str_]) -> str:
+def counted(campaign: xr.Dataset, words: NDArray[np.str_], lines: str = "lines are medians") -> str:
     """How many samples hold, how many of them are drawn, and what bands and lines are."""
     count = int(good(campaign).sum())
     drawn = "" if len(words) == count else f" {len(words)} of them are drawn."
-    lines = " Bands span the samples of an ending, lines are medians."
+    lines = f" Bands span the samples of an ending{'; ' * bool(lines)}{lines}."
     if of_cases(campaign):
         lines = lines_told(campaign)
     return f"{told(campaign, count)}.{drawn}{lines}"
 
 
+def over_time_told(campaign: xr.Dataset, words: NDArray[np.str_]) -> str:
+    """The same of courses over time, which a sample of each ending stands for."""
+    line = f"the line is {middle_told(campaign, 'that ending')}"
+    return counted(campaign, words, line * bool(judged_by(campaign)))
+
+
 def bands_by_ending(
-    axes: Axes, x: Array, values: Array, words: NDArray[np.str_], cases: Looks
+    axes: Axes, x: Array, values: Array, words: NDArray[np.str_], cases: Looks,
+    lines: Mapping[str, tuple[int, int]] | None = None,
 ) -> None:  # fmt: skip
-    """Range and median of the curves (sample, x) of each ending, as long as any of them lasts; or
-    the curves themselves, of ``cases``.
+    """Range of the curves (sample, x) of each ending, as long as any of them lasts, and their
+    median, or of ``lines`` the row and sample of each ending; or all curves, of ``cases``.
     """
     for row, look in zip(values, cases, strict=False):
         axes.plot(x, row, **look)
@@ -79,29 +98,43 @@ def bands_by_ending(
         own = own[:, known := np.isfinite(own).any(axis=0)]
         if not own.size:
             continue
-        axes.fill_between(x[known], np.nanmin(own, axis=0), np.nanmax(own, axis=0), color=colour,
-                          alpha=0.22, linewidth=0.0)  # fmt: skip
+        label = f"{word} ({len(own)})"
+        # With an edge: of one sample alone the band is a line.
+        axes.fill_between(x[known], np.nanmin(own, axis=0), np.nanmax(own, axis=0),
+                          facecolor=(colour, 0.22), edgecolor=(colour, 0.5),
+                          linewidth=0.6)  # fmt: skip
+        middle = np.full(own.shape[1], np.nan)
+        if lines is None:
+            middle = np.nanmedian(own, axis=0)
+        elif word in lines:
+            row, sample = lines[word]
+            middle, label = values[row, known], f"{label}, line: sample {sample}"
         dashes = ("solid", (0, (5, 2)), (0, (2, 1.5)), (0, (6, 1.5, 1, 1.5)))[number % 4]
-        axes.plot(x[known], np.nanmedian(own, axis=0), color=colour, linestyle=dashes,
-                  label=f"{word} ({len(own)})")  # fmt: skip
+        axes.plot(x[known], middle, color=colour, linestyle=dashes, label=label)
 
 
 def over_time(
-    figure: Figure, panels: Sequence[Axes], campaign: xr.Dataset, curves: Sequence[Array],
-    words: NDArray[np.str_], cases: Looks, until: float,
-) -> None:  # fmt: skip
-    """A panel a set of curves (sample, time), up to the last time at which any is known, and not
-    beyond one, s.
+    figure: Figure, panels: Sequence[Axes], campaign: xr.Dataset, read: xr.Dataset,
+    curves: Sequence[Array], words: NDArray[np.str_],
+) -> str:  # fmt: skip
+    """A panel a set of curves (sample, time) of what was ``read`` of a campaign, up to the last
+    time at which any is known, or where nearly all samples are over: a sentence on the others.
     """
-    time = campaign["time"].to_numpy()
-    last = 0
+    time, last = read["time"].to_numpy(), 0
+    cases, samples = looks_of_cases(campaign, read["sample"].values), read["sample"].to_numpy()
+    lines = {
+        word: (int(np.searchsorted(samples, sample)), sample)
+        for word, sample in middles(campaign, endings(campaign)).items()
+    }
+    until, ran_on = shown_until(campaign)
     for axes, values in zip(panels, curves, strict=True):
-        bands_by_ending(axes, time, values, words, cases)
+        bands_by_ending(axes, time, values, words, cases, lines)
         if (known := np.flatnonzero(np.isfinite(values).any(axis=0))).size:
             last = max(last, int(known[-1]))
     panels[0].set_xlim(time[0], min(time[max(last, 1)], until))
-    panels[-1].set_xlabel(style.label(campaign["time"]))
+    panels[-1].set_xlabel(style.label(read["time"]))
     legend(figure, panels, 4)
+    return ran_on
 
 
 _WORDS = {"base_force": "force at the base", "base_torque": "torque at the base"}
@@ -122,10 +155,8 @@ def base_load(campaign: xr.Dataset) -> Figure:
         curves.append(np.linalg.norm(parts.to_numpy(), axis=1))
         axes.set_ylabel(style.label(parts.assign_attrs(long_name=text), width=30))
         style.span_sizes(axes, curves[-1])
-    cases = looks_of_cases(campaign, read["sample"].values)
-    until, ran_on = shown_until(campaign)
-    over_time(figure, panels, read, curves, words, cases, until)
-    note = f"{counted(campaign, words)}{ran_on} At recorded times: peaks may be higher."
+    ran_on = over_time(figure, panels, campaign, read, curves, words)
+    note = f"{over_time_told(campaign, words)}{ran_on} At recorded times: peaks may be higher."
     head(figure, campaign, "What the base carries", note)
     return figure
 
@@ -247,11 +278,9 @@ def motors(campaign: xr.Dataset) -> Figure:
             curves.append(read[what].to_numpy()[:, plane, winch])
             axes.set_title(name, fontsize=9.5)
             axes.set_ylabel(style.label(read[what], width=22), fontsize=9)
-    cases = looks_of_cases(campaign, read["sample"].values)
-    until, ran_on = shown_until(campaign)
-    over_time(figure, grid.ravel().tolist(), read, curves, words, cases, until)
+    ran_on = over_time(figure, grid.ravel().tolist(), campaign, read, curves, words)
     grid[-1, 0].set_xlabel(style.label(read["time"]))
-    head(figure, campaign, "Motors", counted(campaign, words) + ran_on)
+    head(figure, campaign, "Motors", over_time_told(campaign, words) + ran_on)
     return figure
 
 

@@ -17,6 +17,7 @@ from ringsim.analysis.design import (
     called,
     endings,
     inputs,
+    judged_by,
     placement,
     population_of,
     scalars,
@@ -26,6 +27,7 @@ from ringsim.analysis.intervals import (
     ALIKE,
     good,
     hardly_apart,
+    is_moment,
     quantities,
     tells_of,
     used,
@@ -116,26 +118,42 @@ MOST_PANELS = 9
 """Of a sheet: more could not be read."""
 
 
+def drawable(campaign: xr.Dataset) -> list[str]:
+    """Main numbers, and whatever else tables have that differs between samples, or is limited."""
+    limited, names = required_by(campaign.attrs), scalars(campaign)
+    return names + [
+        name for name, variable in quantities().items()
+        if name not in names and name in campaign and len(values_of(campaign, name)[1])
+        and (name in limited or (
+            variable.dtype == "f8" and not is_moment(name) and varies(campaign, name)
+        ))
+    ]  # fmt: skip
+
+
 def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tuple[list[str], str]:
-    """So many main numbers that differ between samples or have limits, and a word on others.
+    """So many numbers that differ between samples or have limits, and a word on others.
 
     ``what`` is what the figure draws of each, where that is not all.
 
-    All count if none differs.  Those with limits go first if there are more.
+    All count if none differs.  If there are more, those with limits go first, then those that
+    differ most for their size.
     """
-    limited = required_by(campaign.attrs)
-    names = scalars(campaign)
-    names += [
-        name for name in limited
-        if name in campaign and name in quantities() and name not in names
-        and len(values_of(campaign, name)[1])
-    ]  # fmt: skip
+    limited, names = required_by(campaign.attrs), drawable(campaign)
     flat, told = still(campaign, names)
     names = [name for name in names if name not in flat]
     if len(names) > most:
         names.sort(key=lambda name: name not in limited)
-        told += f" Not drawn for want of room: {what}{', '.join(names[most:])}."
-    return names[:most], told
+        order = sorted(names, key=lambda name: (name not in limited, -_spread(campaign, name)))
+        others = [name for name in names if name in order[most:]]
+        told += f" Not drawn for want of room: {what}{', '.join(others)}."
+        names = [name for name in names if name not in others]
+    return names, told
+
+
+def _spread(campaign: xr.Dataset, name: str) -> float:
+    """Range of a number over its size."""
+    values = values_of(campaign, name)[1]
+    return float(np.ptp(values) / np.abs(values).max()) if values.any() else 0.0
 
 
 def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
@@ -197,6 +215,28 @@ def shown_until(campaign: xr.Dataset) -> tuple[float, str]:
 def bands(values: NDArray[np.floating]) -> NDArray[np.floating]:
     """``QUANTILES`` over the first axis, NaN left out; shape (5, ...)."""
     return np.asarray(np.nanquantile(values, QUANTILES, axis=0))
+
+
+# The sample in the middle: of runs that last for 28 to 42 s the medians at each time are of no
+# ring, and lie far below what every one of them has.
+
+
+def middles(campaign: xr.Dataset, words: NDArray[np.str_]) -> dict[str, int]:
+    """By word the sample in the middle of those that have it, by what samples are judged by; of
+    words without a value none.  ``words`` has one of each sample.
+    """
+    if not (name := judged_by(campaign)):
+        return {}
+    samples, values = values_of(campaign, name)
+    samples = samples[np.argsort(VARIABLES[name].badness * values, kind="stable")]
+    sorts = words[np.searchsorted(campaign["sample"].to_numpy(), samples)]
+    found = {word: samples[sorts == word] for word in dict.fromkeys(sorts.tolist())}
+    return {word: int(own[(len(own) - 1) // 2]) for word, own in found.items()}
+
+
+def middle_told(campaign: xr.Dataset, of: str) -> str:
+    """What the line of a sample in the middle ``of`` some is, as the end of a sentence."""
+    return f"the sample whose {judged_by(campaign)} is the median of {of}"
 
 
 # Cases that stand for no population: each is drawn, and nothing is told of all of them together.

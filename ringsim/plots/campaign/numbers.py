@@ -116,8 +116,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
 
 
 _POINTS = 400
-_MOST_REQUIRED, _LEAST_NUMBERS = 9, 3
-"""Requirements on a sheet at most, and numbers for which they leave room: a row."""
+_MOST_REQUIRED, _LEAST_NUMBERS, _COLUMNS = 9, 3, 3
+"""Requirements on a sheet at most, numbers for which they leave room, and panels in a row."""
 _INTERVALS = 12
 """Points of the band: each costs a bootstrap."""
 
@@ -196,9 +196,12 @@ def convergence(campaign: xr.Dataset) -> Figure:
     placed, wanted = placement(campaign), _required(campaign)
     untold = [name for name in required_by(campaign.attrs) if name not in wanted]
     campaign, blocks = standing(campaign)
+    others = _met_most(campaign, wanted)[_MOST_REQUIRED:]
     room = max(MOST_PANELS - len(wanted), _LEAST_NUMBERS)
+    # Numbers fill the last row, too.
+    room += -(room + len(wanted) - len(others)) % _COLUMNS
     names, flat = shown(campaign, room, "mean and quantile of ")
-    if others := _met_most(campaign, wanted)[_MOST_REQUIRED:]:
+    if others:
         flat += (
             " Not drawn, as at least as many samples meet them as any other: the requirements of "
             f"{', '.join(others)}."
@@ -209,7 +212,7 @@ def convergence(campaign: xr.Dataset) -> Figure:
             f" Not drawn, as not all samples tell of them: the requirements of {', '.join(untold)}."
         )
     count = len(names) + len(wanted)
-    figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3)
+    figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3, most=_COLUMNS)
     for axes, name in zip(panels, names, strict=False):
         samples, values = values_of(campaign, name)
         # The end that an engineer fears.

@@ -31,7 +31,7 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import one_at_a_time
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import (
-    MOST_PANELS,
+    drawable,
     head,
     in_lines,
     legend,
@@ -60,7 +60,10 @@ _INSIDE = {
 }
 """What a second, thinner bar shows beside it."""
 _BY_CHANCE = "exceeded by chance in one case of 20"
-_MOST = 8
+_MOST, _MOST_PANELS = 8, 10
+"""Bars of a panel, and panels of a sheet: its two columns are full."""
+_BAR = 0.4
+"""Height of what is told of an input, inch."""
 _NONE = 3 * (np.empty(0), np.empty((0, 2)))
 
 
@@ -91,7 +94,7 @@ def analysed(campaign: xr.Dataset) -> xr.Dataset:
     """The indices that the design of a campaign allows of its main numbers, and rank correlations
     but of blocks, which need none.
     """
-    names, placed = scalars(campaign), placement(campaign)
+    names, placed = drawable(campaign), placement(campaign)
     found = sensitivity(campaign, {}, placed, names)
     if "factor" in found.dims and all(_measure(found, name) for name in names):
         return found
@@ -121,7 +124,7 @@ def bars_of(campaign: xr.Dataset) -> Iterator[tuple[str, Bars]]:
     """The bars of every main number, then those of failures, by the most telling measure of each;
     what has none only if samples without a value are why.
     """
-    analysis, names = analysed(campaign), scalars(campaign)
+    analysis, names = analysed(campaign), drawable(campaign)
     others = analysis["output"].values.tolist() if "output" in analysis.dims else []
     stand = population_of(campaign)
     matter = {output: chosen for output, chosen, _ in mattering(analysis)}
@@ -205,7 +208,7 @@ def explained(campaign: xr.Dataset) -> bool:
     stand = population_of(campaign)
     varied = any(
         len(values_of(stand, name)[1]) >= LEAST and varies(stand, name)
-        for name in scalars(campaign)
+        for name in drawable(campaign)
     )
     told_apart = one_at_a_time(campaign) or subset_simulation(campaign.attrs) is not None
     return varied and bool(drawn(campaign).names) and not told_apart
@@ -219,18 +222,27 @@ def tornado(campaign: xr.Dataset) -> Figure:
     # Those that something is required of first: a page has no room for all.
     wanted = required_by(campaign.attrs)
     every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
-    flat, unmoved = still(population_of(campaign), scalars(campaign))
+    flat, unmoved = still(population_of(campaign), drawable(campaign))
     every = [each for each in every if each[0] not in flat]
     quiet = [name for name, bars in every if bars.measure and not bars.names]
     every = [each for each in every if each[0] not in quiet]
-    found = every[:MOST_PANELS]
+    found = every[:_MOST_PANELS]
     found = found or [("", Bars("", [], *_NONE, np.nan, "no significant input" if quiet else
                                 "no sensitivity measure"))]  # fmt: skip
-    rows = max(len(bars.names) for _, bars in found)
-    figure, panels, _ = style.new_panels(len(found), 5.2, 1.3 + 0.34 * rows, 1.1, most=2)
+    # A row is as high as its bars need, and has 0.75 inch of words.
+    counts = [max(1, len(bars.names)) for _, bars in found]
+    rows = [max(counts[k : k + 2]) for k in range(0, len(found), 2)]
+    heights = [_BAR * (most + 0.4) for most in rows]
+    words_of_rows = 1.1 + 0.75 * len(heights)
+    figure, panels, _ = style.new_panels(len(found), 5.2, heights, words_of_rows, most=2)
+    alike = {bars.told for _, bars in found if bars.names}
+    shared = alike.pop() if len(alike) == 1 and len(found) > 1 else ""
     certain, uncertain = False, False
-    for axes, (output, bars) in zip(panels, found, strict=True):
+    for number, (axes, (output, bars)) in enumerate(zip(panels, found, strict=True)):
         _draw(axes, bars)
+        # Bars of one height, whatever their number.
+        beside = 0.5 * (heights[number // 2] / _BAR - counts[number])
+        axes.set_ylim(-0.5 - beside, counts[number] - 0.5 + beside)
         known = np.isfinite(bars.ends).all(axis=1)
         certain, uncertain = certain or bool(known.any()), uncertain or not known.all()
         # Without its unit, which is not that of the bars.
@@ -238,11 +250,9 @@ def tornado(campaign: xr.Dataset) -> Figure:
         axes.set_title(words, fontsize=9.5, color=style.INK)
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
         unit = unit_behind("", units) if bars.measure == "mean_absolute_effect" else ""
-        below = f"\n{bars.told}" if bars.told and bars.names else ""
+        below = f"\n{bars.told}" if bars.told and bars.told != shared else ""
         if bars.names:
-            two = np.isfinite(bars.inside).any() and bars.measure in _INSIDE
-            beside = f", and {_INSIDE[bars.measure][1]}" if two else ""
-            axes.set_xlabel(f"{MEASURES[bars.measure]}{unit}{beside}{below}", fontsize=9)
+            axes.set_xlabel(f"{MEASURES[bars.measure]}{unit}{_beside(bars)}{below}", fontsize=9)
     if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
         legend(figure, panels)
     whiskers = "Whiskers: 95 % intervals." if certain else ""
@@ -250,20 +260,29 @@ def tornado(campaign: xr.Dataset) -> Figure:
         whiskers = "The design allows no intervals."
     if certain and uncertain:
         whiskers += " Bars without whiskers: interval not known."
-    most = max((len(values_of(campaign, name)[0]) for name in scalars(campaign)), default=0)
+    most = max((len(values_of(campaign, name)[0]) for name in drawable(campaign)), default=0)
     beyond = any(np.isfinite(bars.chance) for _, bars in found)
     of = f"The longest {_MOST} bars at most{', significant inputs only' * beyond}."
     if any((np.abs(bars.values) < bars.chance).any() for _, bars in found):
         of += (
             " Where an index ends before the dashed line, the correlation below it is significant."
         )
-    caption = " ".join(filter(None, [f"{told(campaign, most)}.", whiskers, of]))
+    each = f"{shared[0].upper()}{shared[1:]} in each panel." if shared else ""
+    caption = " ".join(filter(None, [f"{told(campaign, most)}.", each, whiskers, of]))
     if quiet:
         caption += f" No significant input for {', '.join(quiet)}."
-    if others := [name for name, _ in every[MOST_PANELS:]]:
+    if others := [name for name, _ in every[_MOST_PANELS:]]:
         caption += f" Not drawn for want of room: {', '.join(others)}."
     head(figure, campaign, "What matters", caption + unmoved)
     return figure
+
+
+def _beside(bars: Bars) -> str:
+    """What the thinner bars are, as the end of an axis label."""
+    second, word = _INSIDE.get(bars.measure, ("", ""))
+    words = [word] * bool(second and np.isfinite(bars.inside).any())
+    words += ["rank correlation"] * bool(np.isfinite(bars.plain).any())
+    return f", and {' or '.join(words)}" * bool(words)
 
 
 def _draw(axes: Axes, bars: Bars) -> None:
@@ -304,8 +323,8 @@ def _row(
 ) -> None:  # fmt: skip
     if not len(values):
         return
-    # Hatched, so that the two are told apart in grey.
-    hatch = "////" if colour == style.ORANGE else ""
+    # Hatched, so that they are told apart in grey.
+    hatch = {style.ORANGE: "////", style.PURPLE: "...."}.get(colour, "")
     axes.barh(height, values, height=thick, color=colour, label=label, linewidth=0.0,
               hatch=hatch, edgecolor="white")  # fmt: skip
     known = np.isfinite(ends).all(axis=1)
