@@ -2,9 +2,9 @@
 
 Run: python benchmarks/optimisers.py [--problems N]     (optuna, cma and pymoo if installed)
 
-Made problems in the unit box with an optimum that is known: a quadratic cost with ripples and a kink
-of a tenth of it, and a constraint that its optimum breaks.  Printed is the median of what is left to
-the best value (COBYQA with 2,000 evaluations) after 40 and 80 evaluations.
+Made problems in the unit box: a quadratic cost with ripples and a kink of a tenth of it, and a
+constraint that its optimum breaks.  Printed is the median of what is left to the best value (COBYQA
+with 2,000 evaluations) after 40 and 80 evaluations.
 """
 
 from __future__ import annotations

@@ -228,8 +228,8 @@ def optimise_command(
         found = optimisation_of(read_text(file), file, settings)
         budget = found.budget
         click.echo(
-            f"{found.table['name']}: up to {budget.designs} designs of {budget.samples} samples, one "
-            f"after the other, then verdicts of {budget.verdict} samples; what has run is kept"
+            f"{found.table['name']}: up to {budget.designs} designs of {budget.samples} samples, "
+            f"one after the other, then verdicts of {budget.verdict} each; what has run is kept"
         )
         return found
 
