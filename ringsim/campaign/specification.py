@@ -290,6 +290,11 @@ def campaign_of(
             f"{path.name}: structure: this is a scene, not a campaign file: run it with ringsim "
             f'run, or name it in a campaign file, as scene = "{path.name}"'
         )
+    for key, verb in {"measured": "calibrate", "variables": "optimise"}.items():
+        if key in table:
+            raise InputError(
+                f"{path.name}: {key}: this is no campaign file: run it with ringsim {verb}"
+            )
     if samples is not None and isinstance(design := table.get("design"), dict):
         kind = kinds_of(Design).get(str(design.get("kind")))
         if kind is not None and "samples" not in kind.model_fields:

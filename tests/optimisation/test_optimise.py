@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -180,6 +182,31 @@ def test_what_is_refused(change, words, tmp_path):
     assert words in str(error.value)
     assert "\n" not in str(error.value)
     assert str(error.value).startswith("quick.toml: ")
+
+
+def test_other_verbs_name_this_one(file):
+    done = CliRunner().invoke(cli, ["campaign", str(file)])
+    assert done.exit_code == 2
+    assert "variables: this is no campaign file: run it with ringsim optimise" in done.output
+
+
+MPIEXEC = shutil.which(
+    "mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: install ringsim[mpich]")
+def test_ranks_of_mpi_find_the_same(found, file, tmp_path):
+    front, _ = found
+    done = subprocess.run(
+        [MPIEXEC, "-n", "2", sys.executable, "-m", "mpi4py", "-m", "ringsim", "optimise", str(file),
+         "--out", str(tmp_path / "out")],
+        capture_output=True, text=True, timeout=600,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("wrote ") == 1
+    xr.testing.assert_equal(xr.load_dataset(tmp_path / "out" / FRONT), front)
 
 
 def test_budget_can_be_set_in_the_call(file):
