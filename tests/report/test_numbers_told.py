@@ -7,6 +7,7 @@ from __future__ import annotations
 import itertools
 import json
 import re
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from html.parser import HTMLParser
 
 import numpy as np
@@ -221,7 +222,12 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
 
         run, worse = used + lost, bad + lost  # lost ones violate it, or keep to it
         ends = bound(run - worse, run, level)[0], bound(run - bad, run, level)[1]
-        told = [f"at least {ends[0]:.4g}", f"at most {ends[1]:.4g}"]
+        # Four digits, rounded outwards: what is printed bounds as surely as what was computed.
+        outward = zip(("at least", "at most"), ends, (ROUND_FLOOR, ROUND_CEILING), strict=True)
+        told = [
+            f"{words} {float(Context(prec=4, rounding=way).create_decimal(f'{end:.12g}')):.4g}"
+            for words, end, way in outward
+        ]
         decisive = {"met": told[0], "not met": told[1], "not yet shown": ", ".join(told)}
         assert row["one-sided bound"] == decisive[word(ends)]
         assert row["verdict"] == word(ends)
