@@ -186,7 +186,6 @@ def test_what_is_refused(change, words, tmp_path):
 
 def test_other_verbs_name_this_one(file):
     done = CliRunner().invoke(cli, ["campaign", str(file)])
-    assert done.exit_code == 2
     assert "variables: this is no campaign file: run it with ringsim optimise" in done.output
 
 
