@@ -29,16 +29,19 @@ title = "Three sections, fast enough"
 seed = 4
 scene = "ring18-cable"
 fidelity = "frame"
-designs = 18
-samples = 6
+designs = 10
+samples = 4
 check = 16
 verdict = 24
 
 [set]
 "structure.sections" = 3
-"structure.opening_angle" = 100.0
+"structure.opening_angle" = 150.0
 boom = "none"
 "solver.end_time" = 3.0
+"record.interval" = 0.1
+"cables.upper.winch.winding.speed" = 0.16
+"cables.lower.winch.winding.speed" = 0.16
 
 [variables.speed]
 low = 0.08
@@ -49,7 +52,7 @@ shared = ["cables.upper.winch.winding.speed", "cables.lower.winch.winding.speed"
 peak_tension = { minimise = "mean" }
 
 [constraints]
-deployment_time = { max = 2.5, probability = 0.9, confidence = 0.9 }
+deployment_time = { max = 1.6, probability = 0.9, confidence = 0.9 }
 
 [inputs.friction]
 kind = "lognormal"
@@ -91,10 +94,10 @@ def test_slowest_speed_that_is_fast_enough_is_found(found):
     while high - low > 1e-4:
         middle = 0.5 * (low + high)
         time_ = float(simulate(own_scene(middle, 6e-4), "frame")["deployment_time"])
-        low, high = (low, middle) if time_ <= 2.5 else (middle, high)
-    assert float(front["value"].sel(design="design-1")[0]) == pytest.approx(high, rel=0.02)
+        low, high = (low, middle) if time_ <= 1.6 else (middle, high)
+    assert float(front["value"].sel(design="design-1")[0]) == pytest.approx(high, rel=0.03)
     assert front["verdict"].sel(design="design-1").item() == 2
-    assert float(front["value"].sel(design="present")[0]) == 0.12
+    assert float(front["value"].sel(design="present")[0]) == 0.16
 
 
 def test_numbers_of_the_front_are_those_of_its_campaigns(found):
@@ -107,13 +110,13 @@ def test_numbers_of_the_front_are_those_of_its_campaigns(found):
         assert int(one["short"]) == 24 - int((campaign["outcome"] == 1).sum())
         mean = float(opened["peak_tension"].mean())
         np.testing.assert_allclose(one["objective_value"][0], mean)
-        kept = float((campaign["deployment_time"] <= 2.5).mean())
+        kept = float((campaign["deployment_time"] <= 1.6).mean())
         assert float(one["probability"][0]) == pytest.approx(kept)
         speed = float(one["value"][0])
         scene = ringsim.load_scene(out / f"{name}.toml") if name != "present" else None
         if scene is not None:
             assert scene.cables.lower.winch.winding.speed == speed
-    assert front["short"].values.tolist() == [24, 0]  # at 0.12 m/s nothing opens within 3 s
+    assert front["short"].values.tolist() == [0, 0]
     second = ringsim.open_campaign(out / "designs" / "002-search")
     mean = float(second["peak_tension"].mean())
     np.testing.assert_allclose(front["tried_objective"][1, 0], mean)
@@ -138,6 +141,18 @@ def test_command_prints_what_the_file_holds_and_draws_it(found, file, monkeypatc
     xr.testing.assert_identical(again, front)
 
 
+def test_what_is_missing_is_run_and_nothing_else(found, file, tmp_path):
+    front, out = found
+    again = tmp_path / "out"
+    shutil.copytree(out, again)
+    (again / FRONT).unlink()
+    shutil.rmtree(again / "present")  # the last but one: all before it is there
+    kept = {path: path.stat().st_mtime_ns for path in again.rglob("*.journal")}
+    xr.testing.assert_equal(ringsim.Optimisation.read(file).run(workers=0, out=again), front)
+    assert all(path.stat().st_mtime_ns == time_ for path, time_ in kept.items())
+
+
+@pytest.mark.slow
 def test_killed_and_finished_by_other_workers_it_is_the_same(found, file, tmp_path):
     front, _ = found
     out = tmp_path / "killed"
@@ -146,7 +161,7 @@ def test_killed_and_finished_by_other_workers_it_is_the_same(found, file, tmp_pa
     process = subprocess.Popen(command, start_new_session=True, stdout=subprocess.PIPE,
                                stderr=subprocess.STDOUT)  # fmt: skip
     end = time.monotonic() + 120.0
-    while not (out / "designs" / "004-search").exists() and time.monotonic() < end:
+    while not (out / "designs" / "003-search").exists() and time.monotonic() < end:
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
@@ -157,18 +172,18 @@ def test_killed_and_finished_by_other_workers_it_is_the_same(found, file, tmp_pa
 
 REFUSED = [
     (('low = 0.08', 'low = 0.3'), "variables.speed.low = 0.3 must be below high = 0.2"),
-    (('high = 0.2', 'high = 0.1'), "the scene has 0.12, where the search begins, and 0.08 .. 0.1"),
+    (('high = 0.2', 'high = 0.1'), "the scene has 0.16, where the search begins, and 0.08 .. 0.1"),
     (("upper.winch.winding.speed", "upper.winch.winding.sped"), "winding.sped"),
-    (("cables.upper.winch.winding.speed", "structure.sections"), "structure.sections"),
+    (('["cables.upper.winch.winding.speed"', '["structure.sections"'), "structure.sections"),
     (('["cables.upper.friction.coefficient", ', '["cables.upper.winch.winding.speed", '), "drawn"),
-    (("designs = 18", "designs = 5"), "too few for 1 variables: set designs = 8 at least"),
+    (("designs = 10", "designs = 5"), "too few for 1 variables: set designs = 8 at least"),
     (("verdict = 24", "verdict = 20"), "set verdict = 22 at least"),
     (("peak_tension", "peak_tensio"), "did you mean peak_tension"),
     (("peak_tension", "cable_tension"), "peak_tension"),
     (('minimise = "mean"', 'minimise = "quantile"'), "probability goes with a quantile"),
     (('minimise = "mean"', 'maximise = "mean", minimise = "mean"'), "needs either"),
-    (("designs = 18", "designs = 18\nfront = 3"), "one objective has one best design"),
-    (("designs = 18", 'designs = 18\ndesign = { kind = "random", samples = 3 }'), "leave it out"),
+    (("designs = 10", "designs = 10\nfront = 3"), "one objective has one best design"),
+    (("designs = 10", 'designs = 10\ndesign = { kind = "random", samples = 3 }'), "leave it out"),
     (("[constraints]", "[requirements]"), "calls them constraints"),
 ]  # fmt: skip
 
