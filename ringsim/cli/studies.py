@@ -1,4 +1,4 @@
-"""``ringsim accuracy``, ``stability``, ``calibrate`` and ``sensors``."""
+"""``ringsim accuracy``, ``stability``, ``calibrate``, ``sensors`` and ``optimise``."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -8,6 +8,7 @@ from typing import Any
 import click
 import tomli_w
 
+from ringsim.campaign.run import Ended
 from ringsim.campaign.studies import Panel, by_engines, panels_over
 from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS, draw_result
 from ringsim.execution.mpi import launched_size
@@ -219,8 +220,6 @@ def optimise_command(
     that were tried are campaigns in the same folder.  The same command goes on with one that was
     interrupted; under mpiexec or srun every rank computes, and --workers is left out.
     """
-    import xarray as xr
-
     from ringsim.analysis.optimum import front_tables
     from ringsim.campaign.optimisation import Given, optimisation_of, run_optimisation
 
@@ -234,19 +233,7 @@ def optimise_command(
         return found
 
     ended, path = run_optimisation(given, _most(workers), out)
-    if ended.refused is not None:
-        if ended.first:
-            raise ended.refused
-        return EXIT_BAD_INPUT
-    if ended.first and ended.code == EXIT_DONE:
-        found = xr.load_dataset(path)
-        for table in front_tables(found):
-            for line in ["", *table.lines()]:
-                click.echo(line)
-        click.echo(f"wrote {path}")
-        if plot:
-            draw_result(found, path.parent, path.stem)
-    return ended.code
+    return _told(ended, path, front_tables, plot=plot)
 
 
 def _most(workers: int | None) -> int | None:
@@ -260,8 +247,6 @@ def _course(
     file: Path, settings: dict[str, Any], out: Path | None, workers: int | None,
     tables: Callable[[Any], list[Table]], *, planning: bool, plot: bool = False,
 ) -> int:  # fmt: skip
-    import xarray as xr
-
     from ringsim.campaign.calibration import Given, calibration_of, run_course
 
     def given() -> Given:  # where stages are ordered: on the first rank
@@ -274,6 +259,15 @@ def _course(
         return found
 
     ended, path = run_course(given, _most(workers), out, planning=planning)
+    return _told(ended, path, tables, plot=plot)
+
+
+def _told(
+    ended: Ended, path: Path, tables: Callable[[Any], list[Table]], *, plot: bool
+) -> int:  # fmt: skip
+    """Print what a course of campaigns has found, on the first rank; the exit code."""
+    import xarray as xr
+
     if ended.refused is not None:
         if ended.first:
             raise ended.refused
