@@ -127,6 +127,35 @@ def test_numbers_of_the_front_are_those_of_its_campaigns(found):
     assert second["sample_seed"].values.tolist() == seeds[0]
 
 
+def test_intervals_and_verdicts_are_those_of_an_analysis_of_the_fresh_samples(found):
+    front, out = found
+    for name in front["design"].values:
+        one = front.sel(design=name)
+        told = ringsim.analyse(ringsim.open_campaign(out / str(name)))
+        wanted = told.sel(requirement="deployment_time")
+        for key in ("probability", "probability_lower", "verdict"):
+            assert float(one[key][0]) == pytest.approx(float(wanted[key])), key
+        known = ringsim.open_campaign(out / str(name))["peak_tension"].values
+        low, high = float(one["objective_lower"][0]), float(one["objective_upper"][0])
+        # Of a mean: about two standard errors on either side.
+        error = known.std(ddof=1) / np.sqrt(len(known))
+        assert low < known.mean() < high
+        assert high - low == pytest.approx(2.0 * 2.07 * error, rel=0.25)
+
+
+def test_what_a_variable_buys_is_in_the_designs_that_were_tried(found):
+    front, _ = found
+    values = front["tried_value"].values[:, 0].tolist()
+    for k, name in enumerate(front["design"].values):
+        place = values.index(float(front["value"][k, 0]))
+        assert float(front["searched"][k, 0]) == float(front["tried_objective"][place, 0])
+        assert float(front["searched_beyond"][k, 0]) == float(front["tried_beyond"][place, 0])
+        if name != "present":  # the one variable at its present value is the present design
+            assert float(front["without"][k, 0, 0]) == float(front["searched"][0, 0])
+            assert float(front["without_beyond"][k, 0, 0]) == float(front["searched_beyond"][0, 0])
+    assert not front["tried_lost"].values.any()
+
+
 def test_command_prints_what_the_file_holds_and_draws_it(found, file, monkeypatch):
     front, out = found
     done = CliRunner().invoke(cli, ["optimise", str(file), "--out", str(out), "--plot"])
