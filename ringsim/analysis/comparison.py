@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
+from ringsim.analysis.derived import known_from
 from ringsim.analysis.design import (
     LOST,
     Placement,
@@ -253,6 +254,8 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             "one of them holds a run and the other a campaign: compare two of the same kind (one "
             "sample of a campaign as a run: ringsim replay FOLDER SAMPLE --save run.nc)"
         )
+    for each in (first, second):
+        known_from(each.attrs)
     single = "sample" not in first.dims
     one, other = (_numbered(each) for each in (first, second))
     placed = placement(one), placement(other)

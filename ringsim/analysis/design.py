@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
+from ringsim.analysis.derived import known_from
 from ringsim.analysis.intervals import NONE, NOTHING, Interval, good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
 from ringsim.files import DESIGN, MERGED, campaign_cure
@@ -588,4 +589,5 @@ def open_stored(path: Path) -> xr.Dataset:
             "written"
         ) from None
     _require_codes(found, file)
+    known_from(found.attrs)
     return found

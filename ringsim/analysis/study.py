@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError
 from ringsim.analysis import intervals
 from ringsim.analysis.accuracy import in_favour, settings_at
 from ringsim.analysis.campaign_notes import remark_lines
+from ringsim.analysis.derived import known_from
 from ringsim.analysis.design import (
     LOST,
     NUMERICAL,
@@ -113,6 +114,7 @@ def analyse(
             "this is not a campaign: give the folder that ringsim campaign has written, or its "
             "campaign.nc"
         )
+    own = known_from(campaign.attrs)
     placed = placement(campaign)
     if requirements is None:
         requirements = required_by(campaign.attrs)
@@ -135,6 +137,7 @@ def analyse(
             "learnt": "; ".join(learnt_lines(campaign)),
             "stopping": "".join(stopping_lines(campaign, placed)), NOTE: losses(campaign).note,
             "remarks": "\n".join(remark_lines(campaign)),
+            **({"outputs": campaign.attrs["outputs"]} if own else {}),
         },
     )  # fmt: skip
     found["part"].attrs = about("share of the completed samples, counted from the first")

@@ -5,6 +5,7 @@ import functools
 import hashlib
 import json
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -14,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim import build
+from ringsim import build, extensions
+from ringsim.analysis import derived
 from ringsim.analysis.requirements import to_json
 from ringsim.campaign.specification import SOLVERS, Campaign
 from ringsim.files import DESIGN, DRAFT, writing
@@ -86,6 +88,7 @@ def open_folder(path: Path) -> Folder:
             "use its campaign.nc as it is, or choose another folder with --out for a new campaign"
         )
     scene = scene_from_toml(attributes["scene"], source=f"{path / DESIGN}: scene")
+    derived.known_from(attributes)  # before its requirements, which may be of them
     return Folder(path, table, scene, attributes)
 
 
@@ -151,7 +154,10 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
         "campaign": campaign.text, "campaign_name": wanted.name,
         "output": wanted.output.model_dump_json(),
         "design": wanted.design.model_dump_json(), "requirements": to_json(wanted.requirements),
+        "modules": extensions.digest(campaign.scene.imports),
     }  # fmt: skip
+    if wanted.outputs:
+        attributes["outputs"] = derived.to_json(wanted.outputs)
     if wanted.rule is not None:
         attributes["stop_when"] = wanted.rule.model_dump_json(exclude_none=True)
     if campaign.suspects:
@@ -170,13 +176,18 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
 def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
     """Everything that decides about the results; the keys say what differs if it does."""
     return {
-        "its scene": attributes["scene"],
+        "its scene": _IMPORTS.sub("", attributes["scene"]),
         "its seed": int(attributes["seed"]),
         "the build of ringsim": attributes["sources"],
         "the version of exudyn": attributes["exudyn_version"],
         "its inputs": [column.path for column in table.columns],
         "its solver": attributes["solver"],
+        **({"a module that it imports": own} if (own := attributes.get("modules")) else {}),
     }  # fmt: skip
+
+
+_IMPORTS = re.compile(r"^imports = \[[^\]]*\]\n", re.MULTILINE)
+"""Where modules lie decides about nothing."""
 
 
 def _identity(table: Table, attributes: dict[str, Any]) -> str:
@@ -202,7 +213,9 @@ def digests(table: Table, attributes: dict[str, Any]) -> list[str]:
 
 
 def other_build(old: Folder) -> str:
-    """That another build began a folder, with the names of both; empty if it was this one."""
+    """That another build, or a module that has changed since, began a folder; empty if not."""
+    if extensions.digest(old.scene.imports) != old.attributes.get("modules", ""):
+        return f"a file of {', '.join(old.scene.imports)} has changed since it began"
     mine = build.provenance()
     if old.attributes["sources"] == mine["sources"]:
         return ""
@@ -231,7 +244,7 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
     held = _decisive(old.table, old.attributes)
     mine = {
         "scene": campaign.scene.to_toml(), "seed": campaign.specification.seed, "solver": solver,
-        "sources": build.sources(),
+        "sources": build.sources(), "modules": extensions.digest(campaign.scene.imports),
         "exudyn_version": version("exudyn"),
     }  # fmt: skip
     wanted = _decisive(table, mine)

@@ -24,6 +24,7 @@ from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
 from ringsim.execution.work import Array, Work, relative_cost
 from ringsim.files import MERGED
+from ringsim.outputs import VARIABLES
 from ringsim.refusal import show
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.designs.blocks import Grouped
@@ -70,6 +71,16 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
         f"  workers        {workers}",
         *map(_extent, table.columns),
     ]
+    recorded = [
+        name for name, each in campaign.specification.outputs.items()
+        if any("time" in VARIABLES[one].dims for one in each.names)
+    ]  # fmt: skip
+    if recorded:
+        lines.append(
+            f"  outputs        {', '.join(recorded)} reads records every "
+            f"{campaign.scene.record.interval:g} s: a shorter peak is missed; a smaller "
+            "record.interval shows it"
+        )
     placed = placement_of(design)
     if placed.population and not placed.has_intervals:
         lines.append(f"  statistics     {placed.told}")

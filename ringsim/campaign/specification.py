@@ -10,6 +10,8 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from ringsim import extensions
+from ringsim.analysis import derived
 from ringsim.analysis.intervals import quantities
 from ringsim.analysis.requirements import Requirements
 from ringsim.analysis.verdicts import Condition, Looks, Rule, as_list
@@ -17,7 +19,7 @@ from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
 from ringsim.outputs.balance import instead_of
-from ringsim.outputs.family import VARIABLES, holds
+from ringsim.outputs.family import VARIABLES, axes, holds
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Correlation, Table
@@ -70,6 +72,9 @@ class Specification(Model):
     """With its number, all that the inputs of a sample depend on."""
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
+    imports: list[str] = Field(default_factory=list)
+    """Modules with kinds of your own: files or packages beside this file, or installed ones; also
+    for the scene and what is set in it."""
     set: Annotated[dict[str, Any], BeforeValidator(flat)] = Field(default_factory=dict)
     """Values by scene path that all samples share; tables are joined into those of the scene."""
     inputs: Annotated[
@@ -95,6 +100,9 @@ class Specification(Model):
     """One sample in so many has numerical error bars (``solver.error_bars``); 0 for none."""
     max_failed: Annotated[int, Field(ge=0)] | None = None
     """The campaign stops when more samples than this have failed."""
+    outputs: derived.Outputs = Field(default_factory=dict)
+    """Further outputs, each one number by an expression over what runs store:
+    peak = "max(cable_tension(plane='upper'))"."""
     requirements: Requirements = Field(default_factory=dict)
     """Bounds on outputs, with probability and confidence; ``ringsim analyse`` checks them."""
     stop_when: Annotated[list[Condition], BeforeValidator(as_list)] = Field(default_factory=list)
@@ -304,6 +312,8 @@ def campaign_of(
             )
         design["samples"] = samples
         text += f"\n# called with --samples {samples}"
+    own = extensions.located(extensions.names_in(table), path.parent)
+    extensions.load(own)
     source, learnt = _add_learnt(table, path)
     try:
         specification = Specification.model_validate(table)
@@ -315,6 +325,8 @@ def campaign_of(
     key = "scene"
     try:
         base = load_scene(specification.scene, beside=path) if scene is None else scene
+        if own:
+            base = base.with_values({"imports": list(dict.fromkeys((*base.imports, *own)))})
         key = "set"
         varied = base.with_values(specification.set)
     except InputError as error:
@@ -334,10 +346,13 @@ def campaign_of(
             "leave it out, and run the sample of interest alone (ringsim replay --scene prints "
             "its scene)"
         )
-    wanted = {f"requirements.{name}": name for name in specification.requirements}
+    own_outputs, has = specification.outputs, holds(varied)
+    derived.require_places(own_outputs, axes(varied), path.name)
+    wanted = {f"outputs.{n}": one for n, each in own_outputs.items() for one in each.names}
+    wanted |= {f"requirements.{name}": name for name in specification.requirements}
     wanted |= {f"stop_when.of = {each.of}": each.of for each in specification.stop_when if each.of}
     for where, name in wanted.items():
-        if absent := sorted(set(VARIABLES[name].needs) - holds(varied)):
+        if absent := sorted(set(VARIABLES[name].needs) - has - {derived.NEED}):
             raise InputError(
                 f"{path.name}: {where}: runs of this scene do not have this output, because the "
                 f"scene has no {absent[0]}: leave it out, or add that to the scene"

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis import derived
 from ringsim.analysis.design import placement
 from ringsim.analysis.intervals import CHECKED
 from ringsim.analysis.requirements import OUTCOME, required_by
@@ -88,6 +89,7 @@ class _Judge:
         self._placed = placement(self._empty)
         self.numbers = rule.numbers(campaign.table.samples, self._placed.replicates)
         self._requirements = required_by(campaign.attributes)
+        self._derived = derived.known_from(campaign.attributes)
         named = [each.requirement or each.of for each in rule.conditions]
         self._names = sorted({str(name) for name in named} - {OUTCOME})
         self._known = {name: np.empty(0) for name in self._names}
@@ -105,6 +107,7 @@ class _Judge:
         more = {name: np.full(count - before, np.nan) for name in self._names}
         for result in found.results(np.arange(before, count)) if self._names else ():
             arrays = result.arrays()
+            arrays |= _derived(self._derived, {n: v[None] for n, v in arrays.items()}, arrays)
             for name in self._names:
                 if name in arrays:
                     more[name][result.sample - before] = arrays[name]
@@ -168,7 +171,8 @@ class Watch:
 
 _KEPT = (
     "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "design",
-    "requirements", "check_every", "judge", "max_difference", "stop_when", "suspects", "source",
+    "requirements", "check_every", "judge", "max_difference", "stop_when", "suspects", "modules",
+    "outputs", "source",
     "ringsim_version", "git_commit", "sources", "exudyn_version",
 )  # fmt: skip
 """Attributes of the design that a merged file has, too: what it was run with, whoever merges."""
@@ -270,6 +274,8 @@ def write_merged(
         for name, variable in VARIABLES.items()
         if name in names | scalars and name not in PER_SAMPLE and name not in output.leave_out
     } | PER_SAMPLE
+    own = derived.known_from(attributes)
+    made = {name: each.variable(name) for name, each in own.items()}
     with whole(folder / MERGED) as draft, netCDF4.Dataset(draft, "w") as file:
         file.setncatts(dict(attributes))
         netcdf.add_coordinate(file, "sample", np.arange(table.samples))
@@ -280,12 +286,14 @@ def write_merged(
         if wide == [*names_of_spans.shape] and not table.moves_winches:
             netcdf.add_span_names(file, names_of_spans)
         add_inputs(file, table, compression=output.compression)
-        for name, variable in wanted.items():
+        for name, variable in (wanted | made).items():
             digits = output.significant_digits.get(name)
             netcdf.add_variable(file, variable, compression=output.compression, digits=digits)
-        _copy(file, found, fits, wanted)
+        for name, each in own.items():
+            file[name].expression = each.of
+        _copy(file, found, fits, wanted, own)
         if checks is not None:
-            _add_checks(file, checks, wanted, output)
+            _add_checks(file, checks, wanted | made, output, own)
     return int((~fits[found.form[found.form >= 0]]).sum())
 
 
@@ -307,9 +315,19 @@ def _common(found: Survey) -> tuple[dict[str, NDArray[Any]], set[str], NDArray[n
     return axes, names, fits
 
 
+def _derived(
+    own: Mapping[str, derived.Derived], arrays: Mapping[str, NDArray[Any]],
+    axes: Mapping[str, NDArray[Any]],
+) -> dict[str, NDArray[Any]]:  # fmt: skip
+    """Derived outputs of samples, from arrays over them of what runs store."""
+    stored = {name: values for name, values in arrays.items() if name in VARIABLES}
+    return derived.over_samples(own, stored, axes) if own and stored else {}
+
+
 def _add_checks(
-    file: Any, checks: Survey, wanted: Mapping[str, Variable], output: netcdf.OutputTable
-) -> None:
+    file: Any, checks: Survey, wanted: Mapping[str, Variable], output: netcdf.OutputTable,
+    own: Mapping[str, derived.Derived],
+) -> None:  # fmt: skip
     """Create and fill the variables of the checks."""
     both = {name: v for name, v in wanted.items() if not v.dims and name not in _OF_SAMPLES}
     blocks = {}
@@ -321,16 +339,19 @@ def _add_checks(
         blocks[name] = netcdf.blank(variable, checks.status.shape)
     for result in checks.results(np.arange(len(checks.status))):
         known = {"status": result.status, "cause": result.cause, "reason": result.reason}
-        for name, value in {**result.arrays(), **known}.items():
+        arrays = result.arrays()
+        arrays |= _derived(own, {n: v[None] for n, v in arrays.items()}, arrays)
+        for name, value in {**arrays, **known}.items():
             if name in both:
-                blocks[name][sample_of(result.sample)] = np.asarray(value)[()]
+                blocks[name][sample_of(result.sample)] = np.asarray(value).reshape(())[()]
     for name, values in blocks.items():
         file[f"{name}{CHECKED}"][:] = values
 
 
 def _copy(
-    file: Any, found: Survey, fits: NDArray[np.bool_], wanted: Mapping[str, Variable]
-) -> None:
+    file: Any, found: Survey, fits: NDArray[np.bool_], wanted: Mapping[str, Variable],
+    own: Mapping[str, derived.Derived],
+) -> None:  # fmt: skip
     """Fill blocks of samples, each read from the journals that hold them."""
     sizes = {dim: d.size for dim, d in file.dimensions.items()}
     shapes = {n: tuple(sizes[dim] for dim in v.dims) for n, v in wanted.items()}
@@ -351,5 +372,7 @@ def _copy(
             blocks["log"][k] = result.log
             blocks["overrides"][k] = result.settings()
         blocks["attempts"][:] = found.attempts[start:stop]
+        axes = {name: file[name][:] for name in file.dimensions if name in file.variables}
+        blocks |= _derived(own, blocks, axes)
         for name, values in blocks.items():
             file[name][start:stop] = values

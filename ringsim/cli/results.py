@@ -114,11 +114,10 @@ def analyse_command(
     from ringsim.analysis.study_text import not_met, told
 
     others = parse_reweighted(reweighted)
-    wanted = parse_requirements(required)
     if out is not None:
         require_file(out)
-    with opened(source) as campaign:
-        wanted = required_by(campaign.attrs) | wanted
+    with opened(source) as campaign:  # which tells what further outputs there are
+        wanted = required_by(campaign.attrs) | parse_requirements(required)
         if gate and not wanted:
             raise InputError(
                 f"--gate: {source} has no requirements: give some under [requirements], or with "

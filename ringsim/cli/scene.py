@@ -13,6 +13,7 @@ import click
 import numpy as np
 from click.shell_completion import CompletionItem
 
+from ringsim import extensions
 from ringsim.choice import kind_of, kinds_of
 from ringsim.cli.options import PATH, SETTINGS
 from ringsim.files import require_place, write_text
@@ -472,13 +473,21 @@ def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
 @click.command()
 @click.argument("names", metavar="[NAME]...", nargs=-1, shell_complete=_names)
 @click.option("--schema", metavar="scene|campaign", help="Print the JSON Schema of such files.")
-def explain_command(names: tuple[str, ...], schema: str | None) -> None:
+@click.option(
+    "--import",
+    "imports",
+    metavar="MODULE",
+    multiple=True,
+    help="Know the kinds and outputs of this file or module, too, as under imports of a scene.",
+)
+def explain_command(names: tuple[str, ...], schema: str | None, imports: tuple[str, ...]) -> None:
     """Explain the variables of a result, or the keys of a scene or campaign file.
 
     NAME is a variable (asynchrony_max), the path of a key (cables.upper.winch, solver.step,
     design), or one of the words scene and campaign for all keys of such files.  Without a name all
     variables are listed.
     """
+    extensions.load(extensions.located(imports, Path()))
     if schema is not None:
         _print_schema(schema, names)
         return

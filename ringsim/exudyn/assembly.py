@@ -11,7 +11,7 @@ import scipy
 from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from numpy.typing import NDArray
 
-from ringsim.core.turning import Turning
+from ringsim.core.chain import Turning
 from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Pose
 from ringsim.parts.joints import JointFriction
@@ -87,7 +87,7 @@ def skew(vectors: Array) -> Array:
 # exudyn's damper gives the torque d w + m at a rate w.  Before every residual its d and m are set
 # so that this line goes through the law at Newton's iterate: the residual is the law's, and d is
 # the slope that Newton's tangent has.  So the slope may be the secant to the other side of zero
-# rate where a joint turns round within a step (``ringsim.core.turning``), which no user function
+# rate where a joint turns round within a step (``ringsim.core.chain``), which no user function
 # of exudyn's allows: it differentiates those by itself.
 
 

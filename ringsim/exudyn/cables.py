@@ -10,9 +10,8 @@ from ringsim.cable.chain import ChainState
 from ringsim.cable.records import Cables
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import Winches
-from ringsim.core.chain import Chain
+from ringsim.core.chain import Chain, Turning
 from ringsim.core.tension import PASSING
-from ringsim.core.turning import Turning
 from ringsim.exudyn.assembly import Array, Assembly, Indices
 from ringsim.exudyn.cable_path import CablePath, Placed
 
@@ -99,7 +98,7 @@ class JacobianPattern:
         """All entries as (row, column, value), shape (entries, 3), until the next call.
 
         ``by_q`` and ``by_rate`` multiply the derivatives after coordinates and after rates;
-        ``slopes`` are those of the pulleys' friction (``ringsim.core.turning``), and ``left``
+        ``slopes`` are those of the pulleys' friction (``ringsim.core.chain``), and ``left``
         is the share of each rope's stiffness that its winches do not answer.
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]

@@ -18,7 +18,7 @@ from ringsim.cable.friction import (
 from ringsim.cable.records import BlockSheave, Cables, Sheave
 from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winches import Winches
-from ringsim.core.chain import Chain
+from ringsim.core.chain import Chain, Seen
 from ringsim.core.library import call
 from ringsim.core.tension import (
     Drums,
@@ -26,7 +26,6 @@ from ringsim.core.tension import (
     Spans,
     factors_needed,
 )
-from ringsim.core.turning import Seen
 from ringsim.frame.elimination import Border
 from ringsim.frame.laws import Tape, taped
 from ringsim.frame.mesh import Indices, Mesh, Parts, Skeleton

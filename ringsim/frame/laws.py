@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from ringsim.core.chain import Seen
 from ringsim.core.library import call
-from ringsim.core.turning import Seen
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Skeleton
 from ringsim.layout.bodies import Array, JointOpening
 from ringsim.parts.joints import JointFriction
@@ -165,7 +165,7 @@ class Acting(NamedTuple):
     """Laws on coordinates x = sense * angle, all shape (n,), and the angles' numbers.
 
     The first ``soft`` of them have slopes of their own; behind them is dry friction
-    (``ringsim.core.turning``).
+    (``ringsim.core.chain``).
     """
 
     tape: Tape

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ringsim.choice import kind_of
+from ringsim.core.chain import Seen
 from ringsim.core.library import ASKED, NOT_ASKED, call, empty_of
-from ringsim.core.turning import Seen
 from ringsim.frame.cables import Arms, FrameCables, Laws, Lines, Roped
 from ringsim.frame.elimination import Border, Fronts
 from ringsim.frame.laws import Acting, JointLaws, Openings

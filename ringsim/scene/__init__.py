@@ -14,6 +14,7 @@ import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 import ringsim.cable.faults  # noqa: F401  (kinds of faults)
+from ringsim import extensions
 from ringsim.cable.records import CABLES, Cable, Cables, numbered, path_of, spans_of
 from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
@@ -51,6 +52,8 @@ class Scene(Model):
     """Word for the scene in files and messages."""
     title: Annotated[str, Field(max_length=300)] = ""
     """One line for figures and reports."""
+    imports: Annotated[tuple[str, ...], ListIn] = ()
+    """Modules with kinds of your own: files or packages beside this file, or installed ones."""
     structure: Annotated[Structure, OneOf(default="pantograph-ring")] = PantographRing()
     """What deploys."""
     rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
@@ -127,7 +130,11 @@ class Scene(Model):
     @model_validator(mode="before")
     @classmethod
     def _without_names(cls, table: Any) -> Any:
-        return numbered(table, points_in(table)) if isinstance(table, dict) else table
+        if not isinstance(table, dict):
+            return table
+        # First of all: what follows may be of a kind that they define.
+        extensions.load(extensions.names_in(table))
+        return numbered(table, points_in(table))
 
     def __repr__(self) -> str:
         """Name, title and the kinds of its parts in one line; ``ringsim scenes NAME`` has all."""
@@ -332,4 +339,6 @@ def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
             f"{path.name}: {key}: this is a campaign file, not a scene: run it with ringsim "
             "campaign (--dry-run only checks it), or give the scene that it names"
         )
+    if named := extensions.names_in(table):
+        table["imports"] = extensions.located(named, path.parent)
     return scene_from_table(table, source=path.name)

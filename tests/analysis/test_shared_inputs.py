@@ -20,7 +20,7 @@ from ringsim.export import meaning_of
 from ringsim.plots.campaign.numbers import by_input
 from ringsim.plots.campaign.tornado import bars_of
 from ringsim.refusal import InputError
-from ringsim.report import page, tables
+from ringsim.report import page
 from ringsim.storage.netcdf import read_design, write_design
 
 PATHS = ["temperature.joint.value", "temperature.pulley.value"]
@@ -77,10 +77,10 @@ def test_one_column_one_row_and_one_panel() -> None:
         lines = "\n".join(told(found, full=full))
         assert "cold" in lines
         assert "temperature." not in lines
-    row = next(row for row in tables.drawn(made) if row[0] == "cold")
+    row = next(row for row in page.drawn_inputs(made) if row[0] == "cold")
     assert row[1:3] == ["K", "1"]
     assert row[-1] == ", ".join(PATHS)
-    assert len(tables.drawn(made)) == 4
+    assert len(page.drawn_inputs(made)) == 4
     origins = {value.path: value.origin for value in page.values_of(made)[0]}
     assert [origins[path] for path in PATHS] == ["drawn", "drawn"]
     panels = [axes.get_xlabel() for axes in by_input(made).axes if axes.get_xlabel()]

@@ -16,9 +16,9 @@ from click.testing import CliRunner
 
 from ringsim.cli import cli
 from ringsim.core import library
+from ringsim.core.chain import Seen
 from ringsim.core.library import call
 from ringsim.core.tension import Drums, RopeTable, Spans
-from ringsim.core.turning import Seen
 from ringsim.frame import elimination
 from ringsim.frame.cables import Arms, Laws, Lines, Roped
 from ringsim.frame.elimination import Border, Fronts

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ringsim.core.turning import Turning
+from ringsim.core.chain import Turning
 from ringsim.parts.joints import ViscousCoulombFriction
 
 pytestmark = pytest.mark.quick

@@ -132,7 +132,7 @@ static const D SHORTEST = 1e-9;
 /* Places of used: columns in use, and whether the first three are a hub's. */
 enum { WIDE_USED, STRUNG };
 
-/* ringsim.core.turning.Seen */
+/* ringsim.core.chain.Seen */
 typedef struct {
     Reals last;
     Ints back, stayed, begun;

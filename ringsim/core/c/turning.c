@@ -1,5 +1,5 @@
 /* Slopes of dry friction for Newton, where ropes or joints turn round within a step; see
-   ringsim/core/turning.py. */
+   ringsim/core/chain.py. */
 
 #include "core.h"
 

@@ -1,0 +1,435 @@
+"""Outputs that a campaign file defines itself: expressions over what runs store, one number each.
+
+The text is read by Python's own parser and never run by Python: what is not listed here is refused.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import math
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
+
+from ringsim.outputs import COORDINATES, OUTPUTS, VARIABLES, Output
+from ringsim.refusal import InputError, known_or_nearest, show
+from ringsim.tables import unit_text
+from ringsim.units import Model
+from ringsim.variables import Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NEED = "[outputs] of a campaign file"
+"""What a derived output needs: no scene holds it, so that runs alone do not have it."""
+LONGEST = 500
+"""Letters of an expression: one for people to read, and too short to exhaust a parser."""
+_LAST = 99
+"""Rank among outputs: behind those of ringsim."""
+_DECLARED: dict[str, type[Output]] = {}
+"""Derived outputs by name, each a kind of output that no run computes."""
+
+
+class _Told(NamedTuple):
+    """What is known of an expression before it has values."""
+
+    dims: tuple[str, ...]
+    unit: str
+
+
+class Derived(Model):
+    """One output of the user's own."""
+
+    of: Annotated[str, Field(min_length=1, max_length=LONGEST)]
+    """Expression over stored variables, for example max(latch_rate)."""
+    unit: str | None = None
+    """Its unit; where it is left out, that of the variables."""
+    meaning: Annotated[str, Field(max_length=300)] = ""
+    """What it is, in words, for tables, figures and reports."""
+    worse: Literal["larger", "smaller", "neither"] = "neither"
+    """Which of two values an engineer fears more."""
+
+    @cached_property
+    def tree(self) -> ast.expr:
+        """The parsed expression; InputError if it is none."""
+        try:
+            return ast.parse(self.of.strip(), mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+            why = getattr(error, "msg", None) or "it is nested too deeply"
+            raise InputError(f"{show(self.of)} is no expression: {why}") from None
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Variables that it reads."""
+        found = (node.id for node in ast.walk(self.tree) if isinstance(node, ast.Name))
+        return list(dict.fromkeys(name for name in found if name not in FUNCTIONS))
+
+    def told(self) -> _Told:
+        """Dimensions and unit; InputError if something in it is not allowed."""
+        return _tell(self.tree)
+
+    def variable(self, name: str) -> Variable:
+        """What files and tables say of it."""
+        unit = self.told().unit if self.unit is None else self.unit
+        return Variable(name, (), unit, self.meaning or self.of, worse=self.worse)
+
+    def values(self, known: Mapping[str, xr.DataArray]) -> Any:
+        """Its values, NaN where there are none; ``known`` are the variables that it reads."""
+        return _value(self.tree, known)
+
+
+def _listed(table: Any) -> Any:
+    """A plain text is the expression."""
+    if not isinstance(table, dict):
+        return table
+    return {name: {"of": each} if isinstance(each, str) else each for name, each in table.items()}
+
+
+def _check(outputs: dict[str, Derived]) -> dict[str, Derived]:
+    """Refuse what cannot be computed, or means something already; make the rest known."""
+    for name, each in outputs.items():
+        known = VARIABLES.keys() - _DECLARED.keys() | COORDINATES.keys() | set(FUNCTIONS)
+        if name in known:
+            raise ValueError(f"{name} means something already: choose another name")
+        if not name.isidentifier() or not name.isascii() or name.startswith("_"):
+            raise ValueError(
+                f"{show(name)} must be a name of letters, digits and underscores, such as peak_rate"
+            )
+        try:
+            told = each.told()
+        except InputError as error:
+            raise ValueError(f"{name}: {error}") from None
+        if not each.names:
+            raise ValueError(f"{name} = {show(each.of)} has no variable of a run in it")
+        if told.dims:
+            raise ValueError(
+                f"{name} = {show(each.of)} has a value for each {' and '.join(told.dims)}: take "
+                f"one number of them, such as max({each.of})"
+            )
+    declare(outputs)
+    return outputs
+
+
+Outputs = Annotated[dict[str, Derived], BeforeValidator(_listed), AfterValidator(_check)]
+"""Derived output by name; in files a text, or a table with ``of``."""
+_ADAPTER = TypeAdapter(Outputs)
+
+
+def declare(outputs: Mapping[str, Derived]) -> None:
+    """Make derived outputs known wherever outputs are looked up; the last definition counts."""
+    for name, each in outputs.items():
+        if name in _DECLARED:
+            OUTPUTS.remove(_DECLARED.pop(name))
+            VARIABLES.pop(name, None)
+        content = {"variables": (each.variable(name),), "needs": (NEED,), "rank": _LAST}
+        _DECLARED[name] = type(f"Derived_{name}", (Output,), content)
+
+
+def known_from(attributes: Mapping[Any, Any]) -> dict[str, Derived]:
+    """The derived outputs of a design or a merged campaign, which are made known; none without."""
+    text = str(attributes.get("outputs", ""))
+    return _ADAPTER.validate_json(text) if text else {}
+
+
+def to_json(outputs: Mapping[str, Derived]) -> str:
+    """The text that files hold."""
+    return json.dumps({n: each.model_dump(exclude_none=True) for n, each in outputs.items()})
+
+
+def over_samples(
+    outputs: Mapping[str, Derived], arrays: Mapping[str, NDArray[Any]],
+    axes: Mapping[str, NDArray[Any]],
+) -> dict[str, NDArray[np.float64]]:  # fmt: skip
+    """Values of all outputs, shape (samples,), from arrays of stored variables whose first axis are
+    samples; NaN where a run lacks what they need.
+    """
+    import xarray as xr  # here, since it takes most of a second
+
+    known: dict[str, xr.DataArray] = {}
+    for name in dict.fromkeys(name for each in outputs.values() for name in each.names):
+        if name in arrays:
+            dims = ("sample", *VARIABLES[name].dims)
+            coordinates = {dim: axes[dim] for dim in dims if dim in axes}
+            values = np.asarray(arrays[name], dtype=float)
+            if VARIABLES[name].dtype.startswith("i"):  # missing counts are negative
+                values = np.where(values < 0.0, np.nan, values)
+            known[name] = xr.DataArray(values, dims=dims, coords=coordinates)
+    count = len(next(iter(arrays.values()))) if arrays else 0
+    found = {}
+    for name, each in outputs.items():
+        values = np.full(count, np.nan)
+        if all(one in known for one in each.names):
+            with np.errstate(all="ignore"):
+                values = np.broadcast_to(each.values(known).to_numpy(), (count,)).copy()
+        found[name] = np.where(np.isfinite(values), values, np.nan)
+    return found
+
+
+# What an expression may be made of: the same walk tells dimensions and unit, and computes.
+
+
+def _largest(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
+    return values.max(dims) if dims else values
+
+
+def _smallest(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
+    return values.min(dims) if dims else values
+
+
+def _where(largest: Callable[..., xr.DataArray]) -> Callable[..., xr.DataArray]:
+    """Coordinate of the largest or smallest value along one dimension, the others reduced first."""
+
+    def place(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
+        (dim,) = dims
+        others = [str(d) for d in values.dims if d not in (dim, "sample")]
+        values = largest(values, others)
+        found = values.fillna(-np.inf if largest is _largest else np.inf)
+        found = found.idxmax(dim) if largest is _largest else found.idxmin(dim)
+        return found.where(values.notnull().any(dim))
+
+    return place
+
+
+def _integral(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
+    """Trapezoids between records; NaN where a run has none."""
+    (dim,) = dims
+    along, following = values[dim], {dim: -1}
+    each = 0.5 * (values + values.shift(following)) * (along.shift(following) - along)
+    return each.sum(dim, min_count=1)
+
+
+_REDUCTIONS: dict[str, Callable[[xr.DataArray, list[str]], xr.DataArray]] = {
+    "max": _largest,
+    "min": _smallest,
+    "mean": lambda values, dims: values.mean(dims),
+    "sum": lambda values, dims: values.sum(dims, min_count=1),
+    "difference": lambda values, dims: values.max(dims) - values.min(dims),
+    "argmax": _where(_largest),
+    "argmin": _where(_smallest),
+    "integral": _integral,
+}
+"""Functions that take one number of many, over all dimensions or those that ``over`` names."""
+_EACH = {"abs": np.abs, "sqrt": np.sqrt}
+FUNCTIONS = (*_REDUCTIONS, *_EACH)
+_ONE_DIM = ("argmax", "argmin", "integral")
+_BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: lambda a, b: a + b, ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b, ast.Div: lambda a, b: a / b,
+}  # fmt: skip
+_COMPARED: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: lambda a, b: a < b, ast.LtE: lambda a, b: a <= b,
+    ast.Gt: lambda a, b: a > b, ast.GtE: lambda a, b: a >= b,
+}  # fmt: skip
+
+
+def _refuse(node: ast.expr, why: str) -> InputError:
+    return InputError(f"{show(ast.unparse(node))}: {why}")
+
+
+def _number(node: ast.expr) -> float:
+    """A number as it stands; InputError if it is none, or too large."""
+    sign = 1.0
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        sign, node = -1.0, node.operand
+    value = node.value if isinstance(node, ast.Constant) else None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise _refuse(node, "must be a number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise _refuse(node, "must be a finite number")
+    return sign * number
+
+
+def _tell(node: ast.expr) -> _Told:
+    """Dimensions and unit; InputError if it is not allowed."""
+    match node:
+        case ast.Constant():
+            _number(node)
+            return _Told((), "1")
+        case ast.Name(id=name):
+            return _told_of(name)
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=inner):
+            return _tell(inner)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+            first, second = _tell(left), _tell(right)
+            return _Told(_both(first, second), _unit(node, first.unit, second.unit))
+        case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARED:
+            first, second = _tell(left), _tell(right)
+            if "1" not in (first.unit, second.unit):
+                _same(node, first.unit, second.unit)
+            return _Told(_both(first, second), "1")
+        case ast.Call(func=ast.Name(id=name)) if name in FUNCTIONS:
+            return _told_of_call(node, name)
+        case ast.Call(func=ast.Name(id=name), args=[]):
+            told = _told_of(name)
+            ends = dict(_selection(node, told.dims))
+            kept = (d for d in told.dims if d not in ends or isinstance(ends[d], tuple))
+            return _Told(tuple(kept), told.unit)
+    raise _refuse(
+        node, "is not allowed: an expression has variables, numbers, + - * / < >, parentheses, "
+        f"{', '.join(FUNCTIONS)}, and selections such as cable_tension(plane='upper', time=(0, 2))"
+    )  # fmt: skip
+
+
+def _told_of(name: str) -> _Told:
+    known = {n: v for n, v in VARIABLES.items() if v.dtype != "str" and v.flags is None}
+    known = {n: v for n, v in known.items() if NEED not in v.needs}
+    if name not in known:
+        raise InputError(f"{name} is no variable of a run ({known_or_nearest(name, known)})")
+    return _Told(known[name].dims, known[name].units)
+
+
+def _both(first: _Told, second: _Told) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*first.dims, *second.dims)))
+
+
+def _same(node: ast.expr, first: str, second: str) -> str:
+    if first != second:
+        a, b = (unit_text(unit) or "a number" for unit in (first, second))
+        raise _refuse(node, f"{a} and {b} cannot be added or compared")
+    return first
+
+
+def _unit(node: ast.BinOp, first: str, second: str) -> str:
+    """Unit of a sum, difference, product or quotient."""
+    if isinstance(node.op, ast.Add | ast.Sub):
+        return _same(node, first, second)
+    if second == "1":
+        return first
+    if isinstance(node.op, ast.Div):
+        return "1" if first == second else f"{first}/{second}"
+    return second if first == "1" else f"{first} {second}"
+
+
+def _over(node: ast.Call, told: _Told) -> list[str]:
+    """Dimensions that a function reduces."""
+    given = {k.arg: k.value for k in node.keywords}
+    if given.keys() - {"over"} or len(node.args) != 1:
+        raise _refuse(node, 'takes one expression, and over="time" or another dimension')
+    if "over" not in given:
+        if "time" in told.dims and ast.unparse(node.func) in _ONE_DIM:
+            return ["time"]
+        return [*told.dims]
+    word = given["over"]
+    if not isinstance(word, ast.Constant) or word.value not in told.dims:
+        dims = " or ".join(show(dim) for dim in told.dims) or "nothing: leave it out"
+        raise _refuse(node, f"over must be {dims}")
+    return [str(word.value)]
+
+
+def _told_of_call(node: ast.Call, name: str) -> _Told:
+    if len(node.args) != 1:
+        raise _refuse(node, f"{name} takes one expression")
+    told = _tell(node.args[0])
+    if name in _EACH:
+        if node.keywords:
+            raise _refuse(node, f"{name} takes one expression and nothing else")
+        return _Told(told.dims, told.unit if name == "abs" else _root(told.unit))
+    if not told.dims:
+        raise _refuse(node, "is of one number already: leave the function out")
+    dims = _over(node, told)
+    if name in _ONE_DIM and (len(dims) != 1 or (name == "integral" and dims != ["time"])):
+        cure = "of what depends on time" if name == "integral" else f'say over="{told.dims[0]}"'
+        raise _refuse(node, f"{name} is along one dimension: {cure}")
+    if name in ("argmax", "argmin"):
+        if dims[0] not in COORDINATES or COORDINATES[dims[0]].dtype == "str":
+            raise _refuse(node, f"places along {dims[0]} are words: it gives numbers alone")
+        return _Told((), COORDINATES[dims[0]].units)
+    left = tuple(dim for dim in told.dims if dim not in dims)
+    times = "s" if told.unit == "1" else f"{told.unit} s"
+    return _Told(left, times if name == "integral" else told.unit)
+
+
+def _root(unit: str) -> str:
+    half = unit.split(" ")
+    alike = len(half) == 2 and half[0] == half[1]
+    return half[0] if alike else "1" if unit == "1" else f"({unit})^0.5"
+
+
+def _selection(node: ast.Call, dims: tuple[str, ...]) -> list[tuple[str, Any]]:
+    """Dimension with its value, or both ends of a range."""
+    found: list[tuple[str, Any]] = []
+    for each in node.keywords:
+        if each.arg not in dims:
+            known = ", ".join(dims) or "no dimensions"
+            raise _refuse(node, f"{each.arg} is no dimension of it (it has {known})")
+        if isinstance(each.value, ast.Tuple):
+            ends = tuple(_number(end) for end in each.value.elts)
+            if len(ends) != 2 or ends[0] > ends[1]:
+                raise _refuse(node, f"{each.arg} = (from, to) needs two numbers, the smaller first")
+            found.append((each.arg, ends))
+        elif isinstance(each.value, ast.Constant) and isinstance(each.value.value, str):
+            found.append((each.arg, each.value.value))
+        else:
+            found.append((each.arg, _number(each.value)))
+    return found
+
+
+def _value(node: ast.expr, known: Mapping[str, xr.DataArray]) -> Any:
+    """The values of an expression that ``_tell`` has let pass."""
+    match node:
+        case ast.Constant():
+            return _number(node)
+        case ast.Name(id=name):
+            return known[name]
+        case ast.UnaryOp(op=op, operand=inner):
+            value = _value(inner, known)
+            return -value if isinstance(op, ast.USub) else value
+        case ast.BinOp(left=left, op=op, right=right):
+            return _BINARY[type(op)](_value(left, known), _value(right, known))
+        case ast.Compare(left=left, ops=[op], comparators=[right]):
+            first, second = _value(left, known), _value(right, known)
+            # What is missing on either side stays missing.
+            return _COMPARED[type(op)](first, second) * 1.0 + 0.0 * first + 0.0 * second
+        case ast.Call(func=ast.Name(id=name)) if name in _EACH:
+            return _EACH[name](_value(node.args[0], known))
+        case ast.Call(func=ast.Name(id=name)) if name in _REDUCTIONS:
+            values = _value(node.args[0], known)
+            return _REDUCTIONS[name](values, _over(node, _tell(node.args[0])))
+        case ast.Call(func=ast.Name(id=name)):
+            values = known[name]
+            for dim, wanted in _selection(node, VARIABLES[name].dims):
+                values = _selected(values, dim, wanted)
+            return values
+    raise _refuse(node, "is not allowed")
+
+
+def _selected(values: xr.DataArray, dim: str, wanted: Any) -> xr.DataArray:
+    """The part of an array at a place, between two of them, or at a time between records."""
+    if isinstance(wanted, tuple):
+        along = values[dim]
+        return values.isel({dim: np.flatnonzero((along >= wanted[0]) & (along <= wanted[1]))})
+    if dim == "time":
+        return values.interp(time=wanted)
+    return values.sel({dim: wanted}, drop=True)
+
+
+def require_places(
+    outputs: Mapping[str, Derived], axes: Mapping[str, NDArray[Any]], source: str
+) -> None:
+    """Refuse (InputError) selections of places that a scene does not have."""
+    for name, each in outputs.items():
+        for node in ast.walk(each.tree):
+            if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+                continue
+            if node.func.id in FUNCTIONS:
+                continue
+            for dim, wanted in _selection(node, VARIABLES[node.func.id].dims):
+                places = axes.get(dim)
+                if places is None or dim == "time" or isinstance(wanted, tuple):
+                    continue
+                if wanted not in places.tolist():
+                    ends = ", ".join(map(str, places.tolist()[:4]))
+                    more = f", ... {places[-1]}" if len(places) > 4 else ""
+                    raise InputError(
+                        f"{source}: outputs.{name}: {dim} = {show(wanted)} is no {dim} of this "
+                        f"scene ({ends}{more})"
+                    )

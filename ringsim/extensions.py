@@ -1,0 +1,145 @@
+"""Modules of the user's own, which scenes and campaigns name under ``imports``.
+
+Importing one defines its records (structures, laws, faults, distributions, outputs), which from
+then on are choices as all others.  A module is a file or a package beside the file that names it,
+an installed module, or an entry point of the group ``ringsim``.
+"""
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+import traceback
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ringsim.refusal import InputError, known_or_nearest, show
+
+GROUP = "ringsim"
+"""Entry points of installed packages."""
+_LOADED: dict[str, str] = {}
+"""Digest of each module's files when it was imported: Python reads them once."""
+
+
+def located(names: Iterable[str], folder: Path) -> tuple[str, ...]:
+    """Names as a file in ``folder`` gives them: of what lies beside it the whole path.
+
+    So a result tells by itself where its modules are, and every process finds them.
+    """
+    return tuple(_beside(name, folder) or name for name in names)
+
+
+def names_in(table: Mapping[str, Any]) -> tuple[str, ...]:
+    """What a table of a scene or a campaign imports; what is no list of names is refused later."""
+    named = table.get("imports", ())
+    listed = isinstance(named, list | tuple) and all(isinstance(each, str) for each in named)
+    return tuple(named) if listed else ()
+
+
+def _beside(name: str, folder: Path) -> str:
+    """The path of a module or package beside a file; empty if none is there."""
+    given = folder / name
+    if given.suffix == ".py":
+        return str(given.absolute())
+    inside = folder.joinpath(*name.split("."))
+    files = inside.with_name(f"{inside.name}.py"), inside / "__init__.py"
+    return next((str(file.absolute()) for file in files if file.is_file()), "")
+
+
+def load(names: Sequence[str]) -> None:
+    """Import modules by path or name; InputError if one is not there, or fails.
+
+    What is imported already stays as it is.
+    """
+    for name in names:
+        module = _module(name)
+        _LOADED.setdefault(name, _digest(module))
+
+
+def digest(names: Sequence[str]) -> str:
+    """Digest of the files of modules that were loaded; empty of none.
+
+    Of a package it is of all its files, of a module of its own file alone: what belongs to it
+    stands in the package, or is no part of what decides about results.  InputError if a file has
+    changed since it was loaded.
+    """
+    load(names)
+    every = []
+    for name in names:
+        if (now := _digest(_module(name))) != _LOADED[name]:
+            raise InputError(
+                f"imports: {name} has changed since it was loaded, and Python reads it once: start "
+                "Python anew"
+            )
+        every.append(now)
+    return hashlib.blake2b("".join(every).encode(), digest_size=6).hexdigest() if every else ""
+
+
+def _digest(module: ModuleType) -> str:
+    top = sys.modules[module.__name__.partition(".")[0]]
+    if (paths := getattr(top, "__path__", None)) is not None:
+        folder = Path(next(iter(paths)))
+        files = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*.py")}
+    else:
+        files = {"": Path(str(module.__file__))}
+    found = hashlib.blake2b(digest_size=6)
+    for place in sorted(files):
+        content = files[place].read_bytes()
+        found.update(f"{place} {len(content)} ".encode() + content)
+    return found.hexdigest()
+
+
+def _module(name: str) -> ModuleType:
+    path = Path(name)
+    if not path.is_absolute():
+        return _imported(name)
+    package = path.name == "__init__.py"
+    word, folder = (path.parent.name, path.parent.parent) if package else (path.stem, path.parent)
+    if not word.isidentifier():
+        raise InputError(
+            f"imports = {show(name)}: {word} is no name of a module: rename the file, with "
+            "letters, digits and underscores alone"
+        )
+    # Behind all others: a file of the user's must not hide what other modules import.
+    if path.is_file() and str(folder) not in sys.path:
+        sys.path.append(str(folder))
+    if not path.is_file() and word not in sys.modules and importlib.util.find_spec(word) is None:
+        raise InputError(
+            f"imports = {show(name)}: there is no such file, and no module {word}: put it there, "
+            "or add its folder to PYTHONPATH"
+        )
+    module = _imported(word, name)
+    if path.is_file() and Path(str(module.__file__)).resolve() != path.resolve():
+        raise InputError(
+            f"imports = {show(name)}: another module of this name is in use ({module.__file__}): "
+            "rename the file"
+        )
+    return module
+
+
+def _imported(word: str, name: str = "") -> ModuleType:
+    """A module by its name, or that of an entry point."""
+    given = f"imports = {show(name or word)}"
+    known = entry_points(group=GROUP)
+    target = word if name or word not in known.names else known[word].module
+    if target in sys.modules:
+        return sys.modules[target]
+    try:
+        if importlib.util.find_spec(target) is None:
+            raise ModuleNotFoundError(name=target)
+    except (ModuleNotFoundError, ValueError):
+        hint = f" ({known_or_nearest(word, sorted(known.names))})" if known.names else ""
+        raise InputError(
+            f"{given}: there is no module {target}, neither beside the file nor installed{hint}"
+        ) from None
+    try:
+        return importlib.import_module(target)
+    except Exception as error:  # whatever a file of the user's does
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        told = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(
+            f"{given}: it cannot be imported: {told} ({last.filename}, line {last.lineno})"
+        ) from error

@@ -1,0 +1,291 @@
+"""Outputs by expressions: numbers against numpy, what is refused, and where they count."""
+
+from __future__ import annotations
+
+import json
+import random
+import string
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from pydantic import ValidationError
+
+from ringsim import InputError, analyse
+from ringsim.analysis import derived
+from ringsim.analysis.derived import FUNCTIONS, Derived, over_samples
+from ringsim.campaign.specification import Campaign, campaign_of
+from ringsim.cli import cli
+from ringsim.outputs import OUTPUTS, VARIABLES
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
+from ringsim.variables import Status
+
+FILE = """
+name = "own"
+seed = 1
+scene = "truss2"
+fidelity = "frame"
+design = {{ kind = "random", samples = 3 }}
+
+[set]
+"solver.end_time" = 0.5
+"record.interval" = 0.05
+
+[inputs]
+"cables.lower.axial_stiffness" = {{ kind = "uniform", low = 0.9e5, high = 1.1e5 }}
+
+[outputs]
+{outputs}
+
+{more}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _forgotten() -> Iterator[None]:
+    """Other tests do not know what these define."""
+    yield
+    for name in list(derived._DECLARED):
+        OUTPUTS.remove(derived._DECLARED.pop(name))
+        VARIABLES.pop(name)
+
+
+def of(outputs: str, more: str = "") -> Campaign:
+    return campaign_of(FILE.format(outputs=outputs, more=more), Path("own.toml"))
+
+
+def stored() -> tuple[dict[str, Any], dict[str, Any]]:
+    """Made records of four samples, one of which ends early and one without any."""
+    stream = np.random.default_rng(3)
+    axes = {"plane": np.array(["upper", "lower"]), "section": np.arange(1, 4),
+            "span": np.arange(1, 6), "time": np.linspace(0.0, 2.0, 21)}  # fmt: skip
+    arrays = {
+        "cable_tension": stream.random((4, 2, 5, 21)), "asynchrony": stream.random((4, 21)),
+        "opening_angle": stream.random((4, 2, 3, 21)), "lock_time": stream.random((4, 2, 3)),
+        "peak_tension": stream.random(4), "locked_joints": np.array([6, 5, -1, 0]),
+    }  # fmt: skip
+    for name in ("cable_tension", "asynchrony", "opening_angle"):
+        arrays[name][1, ..., 12:] = np.nan
+        arrays[name][2] = np.nan
+    return arrays, axes
+
+
+A, _X = stored()
+T, ASYNC, ANGLE, LOCK = (
+    A[name] for name in ("cable_tension", "asynchrony", "opening_angle", "lock_time")
+)
+MISSING = np.arange(4) == 2
+
+
+def without(values: Any) -> Any:
+    return np.where(MISSING, np.nan, values)
+
+
+with np.errstate(all="ignore"):
+    KNOWN = {
+        "max(cable_tension)": np.nan_to_num(T).max((1, 2, 3)),
+        "min(cable_tension(plane='lower', span=(2, 4)))":
+            np.nan_to_num(T[:, 1, 1:4], nan=9.0).min((1, 2)),
+        "max(cable_tension(span=3, time=(0.5, 1.0)))":
+            np.nan_to_num(T[:, :, 2, 5:11]).max((1, 2)),
+        "max(cable_tension(span=1, time=0.55))": T[:, :, 0, 5:7].mean(-1).max(1),
+        "mean(asynchrony)": np.array([a[np.isfinite(a)].mean() if k != 2 else np.nan
+                                      for k, a in enumerate(ASYNC)]),
+        "difference(lock_time)": np.ptp(LOCK.reshape(4, -1), axis=1),
+        "max(difference(lock_time, over='plane'))": np.abs(LOCK[:, 0] - LOCK[:, 1]).max(1),
+        "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))":
+            np.nan_to_num(np.abs(ANGLE[:, 0] - ANGLE[:, 1])).max((1, 2)),
+        "argmax(asynchrony)": _X["time"][np.nan_to_num(ASYNC, nan=-1.0).argmax(1)],
+        "argmin(lock_time, over='section')": _X["section"][LOCK.min(1).argmin(1)],
+        "integral(asynchrony)": np.array([np.trapezoid(a[np.isfinite(a)], dx=0.1)
+                                          for a in ASYNC]),
+        "integral(asynchrony > 0.5)":
+            np.array([np.trapezoid(1.0 * (a[np.isfinite(a)] > 0.5), dx=0.1) for a in ASYNC]),
+        "sum(lock_time(plane='upper'))": LOCK[:, 0].sum(1),
+        "max(cable_tension) / peak_tension - 2 * 0.5":
+            np.nan_to_num(T).max((1, 2, 3)) / A["peak_tension"] - 1.0,
+        "sqrt(mean(asynchrony * asynchrony))":
+            np.array([np.sqrt(np.nanmean(a * a)) if np.isfinite(a).any() else np.nan
+                      for a in ASYNC]),
+        "-(+peak_tension)": -A["peak_tension"],
+        "locked_joints / 2": np.array([3.0, 2.5, np.nan, 0.0]),
+    }  # fmt: skip
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("text", KNOWN)
+def test_values_are_those_of_numpy(text: str) -> None:
+    """Also of a run that ends early; NaN of one without records."""
+    arrays, axes = stored()
+    found = over_samples({"x": Derived(of=text)}, arrays, axes)["x"]
+    recorded = ("cable_tension", "asynchrony", "opening_angle")
+    expected = without(KNOWN[text]) if any(name in text for name in recorded) else KNOWN[text]
+    assert found == pytest.approx(expected, rel=1e-12, abs=1e-12, nan_ok=True)
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("max(cable_tension)", "N"), ("argmax(asynchrony)", "s"), ("max(lock_time) * 2", "s"),
+     ("integral(cable_tension(plane='upper', span=1))", "N s"), ("locked_joints", "1"),
+     ("peak_tension / deployment_time", "N/s"), ("max(latch_rate) / peak_latch_rate", "1"),
+     ("argmax(lock_time, over='section')", "1"), ("sqrt(peak_tension * peak_tension)", "N"),
+     ("integral(asynchrony > 10)", "s")],
+)  # fmt: skip
+def test_units_follow_from_those_of_the_variables(text: str, unit: str) -> None:
+    assert Derived(of=text).variable("x").units == unit
+    assert Derived(of=text, unit="furlong").variable("x").units == "furlong"
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("max(cable_tension", "is no expression"),
+        ("().__class__", "is not allowed"),
+        ("max(cable_tension).real", "is not allowed"),
+        ("__import__('os')", "is not allowed"),
+        ("__builtins__", "is no variable of a run"),
+        ("10**10**10", "is not allowed"),
+        ("max(cable_tension) if 1 else 2", "is not allowed"),
+        ("max(x for x in y)", "is not allowed"),
+        ("(lambda: 1)()", "is not allowed"),
+        ("[1][0]", "is not allowed"),
+        ("f'{1}'", "is not allowed"),
+        ("max(cable_tension, over='foo')", 'over must be "plane" or "span" or "time"'),
+        ("cable_tension", "max(cable_tension)"),
+        ("3", "has no variable of a run"),
+        ("max(tension)", "is no variable of a run"),
+        ("max(asynchrony) + max(cable_tension)", "cannot be added"),
+        ("max(asynchrony) > max(cable_tension)", "compared"),
+        ("max(cable_tension(span=99))", "span = 99.0 is no span of this scene"),
+        ("max(cable_tension(plane='left'))", "(upper, lower)"),
+        ("max(cable_tension(span=(3, 1)))", "the smaller first"),
+        ("max(cable_tension(section=1))", "is no dimension of it"),
+        ("max(peak_tension)", "is of one number already"),
+        ("argmax(lock_time)", 'say over="plane"'),
+        ("argmax(cable_tension, over='plane')", "are words"),
+        ("integral(lock_time, over='section')", "of what depends on time"),
+        ("1e999 * peak_tension", "must be a finite number"),
+        ("True + peak_tension", "must be a number"),
+        ("max(status)", "is no variable of a run"),
+        ("max(rod_stress)", "the scene has no stress"),
+        ("(" * 230 + "peak_tension" + ")" * 230, "is no expression"),
+        ("-" * 480 + "locked_joints", ""),
+        ("max(cable_tension)" * 40, "at most 500"),
+        ("peak_tension\0", "is no expression"),
+    ],
+)  # fmt: skip
+def test_what_is_no_expression_is_refused_in_one_line(text: str, told: str) -> None:
+    """And what only looks strange is not."""
+    given = f"x = {json.dumps(text)}"
+    if not told:
+        assert of(given).specification.outputs["x"].names == ["locked_joints"]
+        return
+    with pytest.raises(InputError) as refused:
+        of(given)
+    assert "outputs" in str(refused.value)
+    assert told in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.quick
+def test_texts_of_chance_are_refused_or_computed_and_never_run() -> None:
+    """Nothing of them is seen by Python: an import, a call or a file would be."""
+    stream, seen = random.Random(7), []
+    sys.addaudithook(lambda event, _: seen.append(event) if watched else None)
+    words = [
+        *FUNCTIONS, *list(VARIABLES)[:40], *"+-*/()[]{}<>=.,:'\"", "__class__", "over=", "1e9",
+        "lambda", "import", "open", "exec", "eval", "**", "time=(0, 1)", "plane='upper'",
+    ]  # fmt: skip
+    arrays, axes = stored()
+    watched, lines = False, list[str]()
+    for _ in range(2_000):
+        text = "".join(stream.choice([*words, stream.choice(string.printable)])
+                       for _ in range(stream.randrange(1, 12)))  # fmt: skip
+        try:
+            each = Derived(of=text[:500])
+            watched = True
+            told = each.told()
+            if not told.dims and each.names:
+                over_samples({"x": each}, arrays, axes)
+        except InputError as error:
+            lines.append(str(error))
+        except ValidationError:  # an empty one
+            assert not text
+        finally:
+            watched = False
+    assert not any("\n" in line for line in lines)
+    assert not {"import", "open", "exec", "os.system", "subprocess.Popen"} & set(seen)
+
+
+def test_they_count_as_all_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the file, in requirements, in analyses and in figures; a changed one runs nothing again,
+    and so does one of a folder that another process reads.
+    """
+    monkeypatch.chdir(tmp_path)
+    outputs = """
+pull = { of = "max(cable_tension(plane='upper'))", meaning = "largest pull", worse = "larger" }
+apart = "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
+"""
+    more = "[requirements]\npull = { max = 1e3, probability = 0.5, confidence = 0.5 }"
+    Path("own.toml").write_text(FILE.format(outputs=outputs, more=more), encoding="utf-8")
+
+    def call(*words: str) -> str:
+        done = CliRunner().invoke(cli, list(words))
+        assert done.exit_code == EXIT_DONE, done.output
+        return done.output
+
+    call("campaign", "own.toml", "--workers=0")
+    found = xr.load_dataset("runs/own/campaign.nc")
+    assert (found["status"] == Status.OK).all()
+    pull = found["cable_tension"].sel(plane="upper").max(["span", "time"])
+    np.testing.assert_array_equal(found["pull"], pull)
+    angle = found["opening_angle"]
+    apart = abs(angle.sel(plane="upper") - angle.sel(plane="lower")).max(["section", "time"])
+    np.testing.assert_array_equal(found["apart"], apart)
+    assert found["pull"].attrs["long_name"] == "largest pull"
+    assert found["apart"].attrs["units"] in ("deg", "degree")
+
+    _forget = derived._DECLARED.copy()
+    for name in _forget:  # as a process that has not read the campaign file
+        OUTPUTS.remove(derived._DECLARED.pop(name))
+        VARIABLES.pop(name)
+    told = call(
+        "analyse", "runs/own", "--require", "apart: max 90, probability 0.5, confidence 0.5"
+    )
+    assert "pull <= 1000 N" in told
+    assert "apart <= 90 deg" in told
+    verdicts = analyse(xr.open_dataset("runs/own/campaign.nc"))
+    assert verdicts["pull_most"].item() == pull.max().item()
+
+    outputs = outputs.replace("largest pull", "least pull").replace("max(cable", "min(cable")
+    Path("own.toml").write_text(FILE.format(outputs=outputs, more=more), encoding="utf-8")
+    assert "3 of 3" in call("campaign", "own.toml", "--workers=0")
+    again = xr.load_dataset("runs/own/campaign.nc")
+    np.testing.assert_array_equal(again["wall_time"], found["wall_time"])
+    least = found["cable_tension"].sel(plane="upper").min(["span", "time"])
+    np.testing.assert_array_equal(again["pull"], least)
+    assert again["pull"].attrs["long_name"] == "least pull"
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("name", ["peak_tension", "section", "max", "_own", "a b", "lück"])
+def test_names_that_mean_something_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match="outputs"):
+        of(f"{json.dumps(name)} = 'peak_tension'")
+
+
+def test_a_plan_tells_that_records_miss_short_peaks(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(FILE.format(outputs="x = 'max(asynchrony)'", more=""), encoding="utf-8")
+    done = CliRunner().invoke(cli, ["campaign", str(file), "--dry-run", f"--out={tmp_path / 'o'}"])
+    assert done.exit_code == EXIT_DONE
+    assert "reads records every 0.05 s" in done.output
+    bad = CliRunner().invoke(cli, ["analyse", str(tmp_path / "o")])
+    assert bad.exit_code == EXIT_BAD_INPUT
