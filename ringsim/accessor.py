@@ -65,10 +65,9 @@ class Ring:
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
-        if "outputs" in dataset.attrs:
-            from ringsim.analysis.derived import known_from
+        from ringsim.analysis.derived import known_from
 
-            known_from(dataset.attrs)
+        known_from(dataset.attrs)
 
     def __repr__(self) -> str:
         """What it is of, and what it can be asked."""

@@ -8,7 +8,9 @@ an installed module, or an entry point of the group ``ringsim``.
 import hashlib
 import importlib
 import importlib.util
+import re
 import sys
+import tomllib
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import entry_points
@@ -20,6 +22,8 @@ from ringsim.refusal import InputError, known_or_nearest, show
 
 GROUP = "ringsim"
 """Entry points of installed packages."""
+LISTED = re.compile(r"^imports = \[[^\]]*\]\n", re.MULTILINE)
+"""Where the text of a scene, as ringsim writes it, names modules."""
 _LOADED: dict[str, str] = {}
 """Digest of each module's files when it was imported: Python reads them once."""
 
@@ -47,6 +51,12 @@ def _beside(name: str, folder: Path) -> str:
     inside = folder.joinpath(*name.split("."))
     files = inside.with_name(f"{inside.name}.py"), inside / "__init__.py"
     return next((str(file.absolute()) for file in files if file.is_file()), "")
+
+
+def names_of(scene: str) -> tuple[str, ...]:
+    """What the TOML text of a scene imports."""
+    found = LISTED.search(scene)
+    return names_in(tomllib.loads(found[0])) if found else ()
 
 
 def load(names: Sequence[str]) -> None:
@@ -112,7 +122,8 @@ def _module(name: str) -> ModuleType:
             "or add its folder to PYTHONPATH"
         )
     module = _imported(word, name)
-    if path.is_file() and Path(str(module.__file__)).resolve() != path.resolve():
+    # A copy of the same content is the same module.
+    if path.is_file() and path.read_bytes() != Path(str(module.__file__)).read_bytes():
         raise InputError(
             f"imports = {show(name)}: another module of this name is in use ({module.__file__}): "
             "rename the file"

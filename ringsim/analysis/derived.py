@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
 
+from ringsim import extensions
 from ringsim.outputs import COORDINATES, OUTPUTS, VARIABLES, Output
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.tables import unit_text
@@ -131,7 +132,10 @@ def declare(outputs: Mapping[str, Derived]) -> None:
 
 
 def known_from(attributes: Mapping[Any, Any]) -> dict[str, Derived]:
-    """The derived outputs of a design or a merged campaign, which are made known; none without."""
+    """The derived outputs of a design or a merged campaign; with those of the modules that its
+    scene imports, they are made known.
+    """
+    extensions.load(extensions.names_of(str(attributes.get("scene", ""))))
     text = str(attributes.get("outputs", ""))
     return _ADAPTER.validate_json(text) if text else {}
 

@@ -5,7 +5,6 @@ import functools
 import hashlib
 import json
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -176,7 +175,8 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
 def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
     """Everything that decides about the results; the keys say what differs if it does."""
     return {
-        "its scene": _IMPORTS.sub("", attributes["scene"]),
+        # Where modules lie decides about nothing.
+        "its scene": extensions.LISTED.sub("", attributes["scene"]),
         "its seed": int(attributes["seed"]),
         "the build of ringsim": attributes["sources"],
         "the version of exudyn": attributes["exudyn_version"],
@@ -184,10 +184,6 @@ def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
         "its solver": attributes["solver"],
         **({"a module that it imports": own} if (own := attributes.get("modules")) else {}),
     }  # fmt: skip
-
-
-_IMPORTS = re.compile(r"^imports = \[[^\]]*\]\n", re.MULTILINE)
-"""Where modules lie decides about nothing."""
 
 
 def _identity(table: Table, attributes: dict[str, Any]) -> str:

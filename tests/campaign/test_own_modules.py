@@ -1,0 +1,194 @@
+"""Modules that files import: kinds of one's own in workers, under MPI, resumed, replayed."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+from campaign_bench import MPIEXEC, PYTHON
+from ringsim import InputError, load_scene
+from ringsim.cli import cli
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
+
+MODULE = '''
+"""A bearing, an output and a distribution."""
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ringsim.cable.friction import Bearing
+from ringsim.outputs import Output
+from ringsim.sampling.distributions import Uniform
+from ringsim.units import PositiveSpeed, Ratio
+from ringsim.variables import Variable
+
+
+class {word}Friction(Bearing):
+    """f = coefficient (kinetic + (1 - kinetic) exp(-(s / speed)^2))."""
+
+    kind: Literal["{word}"] = "{word}"
+    kinetic: Ratio
+    """Share of the friction that is left where the rope runs fast."""
+    speed: PositiveSpeed
+    """Of the rope, at which the friction has fallen by two thirds of the way."""
+    moves: ClassVar[bool] = True
+
+    def decay(self, pulleys, radius):
+        faded = np.exp(-np.square(pulleys.speed / self.speed))
+        lever = self.coefficients * (self.kinetic + (1.0 - self.kinetic) * faded)
+        return -2.0 * np.arctanh(lever / radius * np.cos(0.5 * pulleys.angle))
+
+
+class {word}Angle(Output):
+    variables = (
+        Variable("{word}_angle", ("plane", "section", "time"), "degree", "opening angle again"),
+        Variable("{word}_most", (), "degree", "largest of them"),
+    )
+
+    def read(self, now):
+        return np.degrees(now.angles)
+
+
+class {word}Half(Uniform):
+    """The lower half of a uniform distribution."""
+
+    kind: Literal["{word}-half"] = "{word}-half"
+
+    def quantile(self, probability):
+        return super().quantile(0.5 * probability)
+'''
+FILE = """
+name = "own"
+seed = 3
+scene = "truss2"
+fidelity = "frame"
+imports = ["{word}"]
+design = {{ kind = "random", samples = 4 }}
+
+[set]
+"solver.end_time" = 1.0
+"cables.upper.friction.kind" = "{word}"
+"cables.upper.friction.kinetic" = 1.0
+"cables.upper.friction.speed" = 1e-3
+
+[inputs]
+"cables.upper.friction.coefficient" = {{ kind = "{word}-half", low = 1e-4, high = 9e-4 }}
+
+[requirements]
+{word}_most = {{ max = 180.0, probability = 0.5, confidence = 0.5 }}
+"""
+WORD = "stribeck_here"
+TWICE = """
+from ringsim.outputs import Output
+from ringsim.variables import Variable
+
+
+class Again(Output):
+    variables = (Variable("asynchrony", (), "1", "again"),)
+"""
+
+
+def call(*words: str, code: int = EXIT_DONE, ranks: int = 0, cwd: Path | None = None) -> str:
+    """What a command prints, in a process of its own."""
+    launcher = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
+    done = subprocess.run(
+        [*launcher, *PYTHON, *words], capture_output=True, text=True, timeout=300, check=False,
+        cwd=cwd,
+    )  # fmt: skip
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a study, half of which has run under MPI where there is one."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / f"{WORD}.py").write_text(MODULE.format(word=WORD), encoding="utf-8")
+    (folder / "own.toml").write_text(FILE.format(word=WORD), encoding="utf-8")
+    ranks = 2 if MPIEXEC else 0
+    call("campaign", "own.toml", "--out=done", "--part=1/2", ranks=ranks, cwd=folder)
+    return folder
+
+
+def test_own_kinds_run_everywhere(study: Path, tmp_path: Path) -> None:
+    """Ranks, workers, replays from another folder, the folder moved; the law is that of a bearing
+    here, and so are the numbers.
+    """
+    call("campaign", "own.toml", "--out=done", "--workers=2", cwd=study)
+    assert "4 of 4" in call("status", str(study / "done"), cwd=tmp_path)
+    found = xr.load_dataset(study / "done/campaign.nc")
+    assert found["status"].values.tolist() == [0] * 4
+    assert "identical" in call("replay", str(study / "done"), "3", cwd=tmp_path)
+    told = call("analyse", str(study / "done"), cwd=tmp_path)
+    assert f"{WORD}_most <= 180 deg" in told
+    # Between steps the one is interpolated with rates and the other without.
+    np.testing.assert_allclose(found[f"{WORD}_angle"], found["opening_angle"], rtol=1e-4)
+    drawn = found["cables_upper_friction_coefficient"].values
+    assert ((drawn > 1e-4) & (drawn < 5e-4)).all()
+    plain = load_scene("truss2").with_values(
+        {"solver.end_time": 1.0, "cables.upper.friction.coefficient": float(drawn[1])}
+    )
+    from ringsim import simulate
+
+    expected = simulate(plain, fidelity="frame")
+    np.testing.assert_allclose(
+        found["opening_angle"].sel(sample=1), expected["opening_angle"], rtol=1e-7
+    )
+
+    # Where a module lies decides about nothing, what it says about everything.
+    moved = Path(shutil.move(study, tmp_path / "moved"))
+    call("campaign", "own.toml", "--out=done", "--workers=1", cwd=moved)
+    file = moved / f"{WORD}.py"
+    file.write_text(file.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+    refused = call("campaign", "own.toml", "--out=done", code=EXIT_BAD_INPUT, cwd=moved)
+    assert "has changed since it began" in refused
+    file.unlink()
+    refused = call("campaign", "own.toml", "--out=done", code=EXIT_BAD_INPUT, cwd=moved)
+    assert f"there is no module {WORD}" in refused
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        ("absent.py", None, "there is no such file"),
+        ("absent", None, "there is no module absent, neither beside the file nor installed"),
+        ("broken_here", "def f(:\n", "it cannot be imported: SyntaxError"),
+        ("failing_here", "\n1 / 0\n", "ZeroDivisionError: division by zero"),
+        ("not-a-name.py", "", "is no name of a module"),
+        ("json", "", "another module of this name is in use"),
+        ("twice_here", TWICE, "there is an output asynchrony already"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_imported_is_refused_in_one_line(
+    name: str, text: str | None, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    if text is not None:
+        (tmp_path / f"{name.removesuffix('.py')}.py").write_text(text, encoding="utf-8")
+    scene = load_scene("truss2").to_toml().replace("imports = []", f'imports = ["{name}"]')
+    (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        load_scene(tmp_path / "scene.toml")
+    assert told in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_own_kinds_are_explained(tmp_path: Path) -> None:
+    """Beside the others, and in the schema."""
+    word = "explained_here"
+    file = tmp_path / f"{word}.py"
+    file.write_text(MODULE.format(word=word), encoding="utf-8")
+    told = call("explain", "cables.upper.friction.kinetic", f"{word}_most", f"--import={file}")
+    assert "Share of the friction that is left where the rope runs fast." in told
+    assert "largest of them" in told
+    assert word in call("explain", "--schema=scene", f"--import={file}")
+    refused = CliRunner().invoke(cli, ["explain", f"{word}_most"])
+    assert refused.exit_code == EXIT_BAD_INPUT
