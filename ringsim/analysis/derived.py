@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -123,12 +123,22 @@ _ADAPTER = TypeAdapter(Outputs)
 
 def declare(outputs: Mapping[str, Derived]) -> None:
     """Make derived outputs known wherever outputs are looked up; the last definition counts."""
+    forget(outputs)
     for name, each in outputs.items():
-        if name in _DECLARED:
-            OUTPUTS.remove(_DECLARED.pop(name))
-            VARIABLES.pop(name, None)
         content = {"variables": (each.variable(name),), "needs": (NEED,), "rank": _LAST}
         _DECLARED[name] = type(f"Derived_{name}", (Output,), content)
+
+
+def forget(names: Iterable[str]) -> None:
+    """The reverse, for those of these names that there are."""
+    for name in [name for name in names if name in _DECLARED]:
+        OUTPUTS.remove(_DECLARED.pop(name))
+        VARIABLES.pop(name)
+
+
+def declared() -> list[str]:
+    """Names of the derived outputs that are known."""
+    return [*_DECLARED]
 
 
 def known_from(attributes: Mapping[Any, Any]) -> dict[str, Derived]:

@@ -134,7 +134,8 @@ class Campaign:
 
         Solver processes are programs of their own (``python -m ringsim.execution.child``), not
         copies of the script: it needs no ``if __name__ == "__main__"``.  What it has defined they
-        do not know, so that kinds of parts of one's own need ``workers = 0``.
+        do not know: kinds of one's own stand in a module that ``imports`` names, or need
+        ``workers = 0``.
 
         Parameters
         ----------

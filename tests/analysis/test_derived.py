@@ -21,7 +21,7 @@ from ringsim.analysis import derived
 from ringsim.analysis.derived import FUNCTIONS, Derived, over_samples
 from ringsim.campaign.specification import Campaign, campaign_of
 from ringsim.cli import cli
-from ringsim.outputs import OUTPUTS, VARIABLES
+from ringsim.outputs import VARIABLES
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.variables import Status
 
@@ -50,9 +50,7 @@ design = {{ kind = "random", samples = 3 }}
 def _forgotten() -> Iterator[None]:
     """Other tests do not know what these define."""
     yield
-    for name in list(derived._DECLARED):
-        OUTPUTS.remove(derived._DECLARED.pop(name))
-        VARIABLES.pop(name)
+    derived.forget(derived.declared())
 
 
 def of(outputs: str, more: str = "") -> Campaign:
@@ -252,10 +250,7 @@ apart = "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
     assert found["pull"].attrs["long_name"] == "largest pull"
     assert found["apart"].attrs["units"] in ("deg", "degree")
 
-    _forget = derived._DECLARED.copy()
-    for name in _forget:  # as a process that has not read the campaign file
-        OUTPUTS.remove(derived._DECLARED.pop(name))
-        VARIABLES.pop(name)
+    derived.forget(derived.declared())  # as in a process that has not read the campaign file
     told = call(
         "analyse", "runs/own", "--require", "apart: max 90, probability 0.5, confidence 0.5"
     )

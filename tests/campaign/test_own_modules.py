@@ -13,7 +13,8 @@ import xarray as xr
 from click.testing import CliRunner
 
 from campaign_bench import MPIEXEC, PYTHON
-from ringsim import InputError, load_scene
+from ringsim import Campaign, InputError, extensions, load_scene
+from ringsim.analysis import derived
 from ringsim.cli import cli
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 
@@ -192,3 +193,45 @@ def test_own_kinds_are_explained(tmp_path: Path) -> None:
     assert word in call("explain", "--schema=scene", f"--import={file}")
     refused = CliRunner().invoke(cli, ["explain", f"{word}_most"])
     assert refused.exit_code == EXIT_BAD_INPUT
+
+
+def test_an_entry_point_names_a_module_of_a_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As an installed package has it; its digest is of all files of the package."""
+    package, told = tmp_path / "hoops_here", tmp_path / "hoops_here-1.0.dist-info"
+    for folder in (package, told):
+        folder.mkdir()
+    (package / "__init__.py").write_text("", encoding="utf-8")
+    (package / "laws.py").write_text("LOADED = True\n", encoding="utf-8")
+    (told / "METADATA").write_text("Name: hoops_here\nVersion: 1.0\n", encoding="utf-8")
+    (told / "entry_points.txt").write_text("[ringsim]\nhoops = hoops_here.laws\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    extensions.load(["hoops"])
+    assert sys.modules["hoops_here.laws"].LOADED
+    before = extensions.digest(["hoops"])
+    assert before
+    (package / "more.py").write_text("", encoding="utf-8")
+    with pytest.raises(InputError, match="imports: hoops has changed since it was loaded"):
+        extensions.digest(["hoops"])
+    with pytest.raises(InputError, match=r"there is no module hoop, .* \(known: hoops\)|did you"):
+        extensions.load(["hoop"])
+
+
+def test_a_campaign_in_python_imports_and_derives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the file has it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    Path("empty_here.py").write_text("", encoding="utf-8")
+    campaign = Campaign(
+        "truss2", {"cables.lower.axial_stiffness": {"kind": "uniform", "low": 9e4, "high": 1e5}},
+        {"kind": "random", "samples": 2}, imports=["empty_here"], fidelity="frame",
+        outputs={"lag_here": "difference(lock_time)"}, set={"solver.end_time": 0.3},
+    )  # fmt: skip
+    found = campaign.run(workers=0)
+    assert found["lag_here"].isnull().all()  # nothing has locked
+    assert found.attrs["modules"]
+    assert str(tmp_path / "empty_here.py") in found.attrs["scene"]
+    derived.forget(derived.declared())
