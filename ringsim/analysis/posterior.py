@@ -59,9 +59,8 @@ _LEAST_KNOWN = 1e-12
 """Variance of a contrast of which the data say nothing, in place of round-off."""
 _LEAST_LEFT = 1e-3
 """Share of a contrast's variance below which another place has explained it."""
-_AS_GOOD = 4.0
-"""Difference of squared sigmas within which two places explain the data alike: the likelihood of
-one is at most e^2 times that of the other."""
+_HOLDS = 0.99
+"""Probability with which the places that are named together hold the one that is unlike."""
 _LEAST_ROW = 5
 """Readings of a sensor from which on their course tells anything."""
 _HARDLY = 0.9
@@ -280,7 +279,8 @@ def contrasts(mean: Array, covariance: Array, prior: Array, inputs: int = 1) -> 
     Before the data the posterior mean m is N(0, P - C), so that a'm of a contrast a has the
     variance a'(P - C)a.  What all have in common (a warmer test) cancels.  After the farthest place
     the others are judged by what it does not explain of them.  Probabilities are Bonferroni's, over
-    all places and so many ``inputs``.
+    all places and so many ``inputs``.  If one place is unlike by an unknown amount, its sigma s
+    gives it a likelihood of exp(s^2 / 2): the likeliest are named that hold it with ``_HOLDS``.
     """
     count = len(mean)
     each = (count * np.eye(count) - 1.0) / (count - 1.0)
@@ -294,9 +294,10 @@ def contrasts(mean: Array, covariance: Array, prior: Array, inputs: int = 1) -> 
         best = max(free, key=lambda k: abs(sigma[k]), default=None)
         if best is None or _of_any(sigma[best], inputs * count) >= FALSE_ALARM:
             break
-        least = np.sqrt(max(0.0, sigma[best] ** 2 - _AS_GOOD))
-        for k in free:
-            group[k] = number if abs(sigma[k]) >= least else 0
+        free.sort(key=lambda k: -abs(sigma[k]))
+        likely = np.cumsum(np.exp(0.5 * (sigma[free] ** 2 - sigma[best] ** 2)))
+        for k in free[: int(np.searchsorted(likely, _HOLDS * likely[-1])) + 1]:
+            group[k] = number
         # Values of the others, given that of the best, over what is left of their scatter.
         shared = alike[:, best] / np.sqrt(left[best])
         rest = sigma * np.sqrt(left) - shared * sigma[best]
