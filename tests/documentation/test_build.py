@@ -82,6 +82,11 @@ def test_the_notebook_was_executed(site: Path) -> None:
     assert "largest asynchrony up to the deployment time" in page
     assert list((site / "_images").glob("*.png"))
     assert 'src="_images/' in (site / "study.html").read_text(encoding="utf-8")
+    page = words(site, "calibration")
+    ends = re.findall(r"(?:coefficient|viscous)" + r"\s+([\d.]+)" * 3, page)
+    assert len(ends) == 2
+    for truth, (low, _, high) in zip((8e-4, 0.6), ends, strict=True):
+        assert float(low) < truth < float(high)
 
 
 def test_nothing_made_is_left_to_make(site: Path) -> None:

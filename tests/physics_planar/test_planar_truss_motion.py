@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from ringsim import load_measured
+from ringsim.analysis.residuals import residuals
+from ringsim.dataset import to_dataset
 from ringsim.scene import load_scene
 from ringsim.simulation import run
 from ringsim.variables import Status
 from truss_runs import DEPLOYED, STOWED
 from truss_statics import bending_strain, statics
 
+ROOT = Path(__file__).parents[2]
 KILOGRAM_FORCE = 9.80665
 
 
@@ -108,6 +114,18 @@ def test_strain_vanishes_at_both_ends_of_the_beam(truss_run):
     slope = (strain[-1] - strain[-2]) / (station[-1] - station[-2])
     assert abs(at_axis) < 0.01 * largest
     assert abs(strain[-1] + slope * (beam - station[-1])) < 0.01 * largest
+
+
+def test_features_of_the_paper_lie_within_their_reading(truss_run):
+    """As the file of measured data has them, which users lay over a run."""
+    test = load_measured(ROOT / "campaigns" / "paper_001" / "measured.toml")
+    found = residuals(to_dataset(truss_run.outcome, truss_run.scene), test)
+    told = {each.readings.sensor.variable: each for each in found}
+    assert told.keys() == {"cable_length", "peak_tension", "peak_bending_strain"}
+    strain = truss_run.outcome.values["peak_bending_strain"]
+    assert told["peak_bending_strain"].apart == pytest.approx(4e-4 - strain)
+    for each in told.values():
+        assert np.abs(each.in_deviations).max() < 0.2
 
 
 def test_opening_angle_follows_the_cable(truss_run):
