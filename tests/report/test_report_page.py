@@ -191,6 +191,7 @@ def test_samples_that_ended_alike_share_a_row_and_words_have_no_unit() -> None:
     ] == "-"
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_how_runs_ended_is_not_told_twice() -> None:
     """Of three samples the worst ones tell it; of four one more would be missing."""
     for stalled in ((5,), (5, 6, 7), (4, 5, 6, 7)):
