@@ -128,6 +128,12 @@ def calibration_of(
     campaign = campaign_of(tomli_w.dumps(table), path, settings, scene=scene)
     if not campaign.specification.inputs:
         raise InputError(f"{path.name}: inputs: there is nothing to find: give priors of unknowns")
+    for name, law in campaign.specification.inputs.items():
+        if law.follows:
+            raise InputError(
+                f'{path.name}: inputs.{name}: kind = "function" follows another input, which '
+                "calibrations cannot: leave it out, or set it under [set]"
+            )
     measurement = load_measured(path.parent / budget.measured, planned=True)
     found = Given(campaign, measurement, budget)
     check_sensors(measurement, campaign.scene)

@@ -226,7 +226,7 @@ def _extent(column: Column) -> str:
         more = [f"and {len(words) - _MOST_SHOWN} more"] if len(words) > _MOST_SHOWN else []
         extent = ", ".join(words[:_MOST_SHOWN] + more) + (unit and f", in {unit}")
     each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
-    return f"  {column.path or f'label {column.name}'}: {extent}{each}"
+    return f"  {column.path or column.input or f'label {column.name}'}: {extent}{each}"
 
 
 # How far it is.

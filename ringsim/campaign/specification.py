@@ -191,6 +191,8 @@ def _cure(error: str, inputs: Mapping[str, Distribution]) -> str:
     if bound is None or not path or "truncate" in error:
         return ""
     law = inputs[path]
+    if law.follows:
+        return ""
     ends = np.array(law.quantile(np.array([0.0, 1.0])))
     if ends.dtype.kind != "f" or np.isfinite(ends).all():
         return ""

@@ -34,7 +34,8 @@ class Column:
     name: str
     """Name in netCDF files: the path with underscores."""
     path: str
-    """Scene path that the values are written to; empty for labels, which tell samples apart."""
+    """Scene path that the values are written to; empty for labels, which tell samples apart, and
+    for inputs that others follow."""
     dim: str
     """Second dimension of ``values``, or empty: "section", "corner", "pulley",
     "pulley_of_two_winches" (one more), or "place_k" for lists of any other length k."""
@@ -121,13 +122,13 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
         packed = compression and not text
         options = {"compression": "zlib", "complevel": compression} if packed else {}
         variable = file.createVariable(column.name, kind, dims, **options)
-        role = "input" if column.path else "label"
+        role = "input" if column.path or column.input else "label"
         variable.long_name = f"{role} {column.path or column.name}"
         if column.has_numbers:
             variable.units = column.units
         variable.setncatts(
             {"path": column.path, "role": role, "distribution": column.origin}
-            | ({"input": column.input or column.path} if column.path else {})
+            | ({"input": column.input or column.path} if role == "input" else {})
             | ({"dtype": "bool"} if values.dtype.kind == "b" else {})
         )
         if values.dtype.kind == "O":

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from ringsim.choice import OneOf
 from ringsim.overrides import section_of
-from ringsim.refusal import show
+from ringsim.refusal import InputError, show
 from ringsim.scene import Scene
 from ringsim.tables import number_text
 from ringsim.units import ListIn, Model
@@ -127,8 +127,17 @@ class Distribution(Model):
     shared: Annotated[tuple[str, ...], ListIn] = ()
     """Scene paths that all take the value drawn; the key of the input is then only its name."""
 
+    @property
+    def follows(self) -> str:
+        """The input that decides about its values; empty if they are drawn."""
+        return ""
+
     def quantile(self, probability: Array) -> Values:
         """Values at cumulative probabilities in the open interval (0, 1), same shape."""
+        raise NotImplementedError
+
+    def values_at(self, name: str, given: Values) -> Array:
+        """Values of an input ``name`` that follows another, at the values of that one."""
         raise NotImplementedError
 
     def levels(self, count: int) -> Array:
@@ -466,6 +475,76 @@ class Uniform(Continuous):
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
         return float(np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0))
+
+
+class Function(Distribution):
+    """What another input decides: a motor's torque by its temperature, a friction by its lot.
+
+    >>> lot = Function(input="lot", table=[["A", 0.1], ["B", 0.3]])
+    >>> lot.values_at("friction", np.array(["B", "A"])).tolist()
+    [0.3, 0.1]
+    """
+
+    kind: Literal["function"] = "function"
+    input: str
+    """The input that it follows: its path, or a name of yours that no path has."""
+    table: Annotated[list[tuple[float | str, float]], Field(min_length=2)]
+    """Pairs of a value of that input and the value here: linear between increasing numbers, or one
+    for each word."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _pairs(cls, given: Any) -> Any:
+        if isinstance(given, dict) and isinstance(rows := given.get("table"), list):
+            pairs = [tuple(row) if isinstance(row, list) else row for row in rows]
+            return given | {"table": pairs}
+        return given
+
+    @model_validator(mode="after")
+    def _usable(self) -> Self:
+        keys = [key for key, _ in self.table]
+        words = [isinstance(key, str) for key in keys]
+        if any(words) != all(words):
+            raise ValueError("table: values of the input must be all words, or all numbers")
+        if all(words) and len(set(keys)) < len(keys):
+            raise ValueError("table: a word stands there twice: leave out one of the rows")
+        if not any(words) and (np.diff(np.array(keys, dtype=float)) <= 0.0).any():
+            raise ValueError("table: values of the input must increase from row to row")
+        if self.shared:
+            raise ValueError("shared: give each path a function of its own")
+        return self
+
+    @property
+    def follows(self) -> str:
+        """The input."""
+        return self.input
+
+    def values_at(self, name: str, given: Values) -> Array:
+        """By the table, same shape; InputError if it does not go so far."""
+        keys, values = zip(*self.table, strict=True)
+        if isinstance(keys[0], str) != (given.dtype.kind not in "iuf"):
+            what = "words" if isinstance(keys[0], str) else "numbers"
+            raise InputError(
+                f"inputs: {name}: its table is of {what}, and {self.input} is not: give the values "
+                "of that input in the first column"
+            )
+        if isinstance(keys[0], str):
+            known = dict(self.table)
+            unknown = sorted({str(word) for word in given.ravel()} - known.keys())
+            if unknown:
+                raise InputError(
+                    f"inputs: {name}: its table has no row for {show(unknown[0])}, a value of "
+                    f"{self.input}: add one"
+                )
+            found = [known[str(word)] for word in given.ravel()]
+            return np.reshape(np.array(found, dtype=float), given.shape)
+        low, high = float(keys[0]), float(keys[-1])
+        if given.min() < low or given.max() > high:
+            raise InputError(
+                f"inputs: {name}: {self.input} is drawn from {given.min():g} to {given.max():g}, "
+                f"and the table goes from {low:g} to {high:g}: add rows, or truncate that input"
+            )
+        return np.asarray(np.interp(given, np.array(keys, dtype=float), values))
 
 
 def law_text(says: Mapping[str, Any]) -> str:

@@ -44,7 +44,24 @@ def draw(
     """
     factors: dict[str, Distribution] = {}
     written: dict[str, str] = {}
+    followers = {name: law for name, law in inputs.items() if law.follows}
+    inputs = {name: law for name, law in inputs.items() if not law.follows}
+    free = {n for n in (law.follows for law in followers.values()) if n in inputs}
+    free = {n for n in free if is_label(n) or ("." not in n and _is_number(inputs[n]))}
+    for name, law in followers.items():
+        if law.follows not in inputs:
+            hint = known_or_nearest(law.follows, inputs)
+            raise InputError(f"inputs: {name} follows {law.follows}, which is not drawn ({hint})")
+        refuse_fixed(base, name)
     for name, distribution in inputs.items():
+        if name in free and not distribution.shared:  # no field of a scene takes it
+            if distribution.each_section:
+                raise InputError(
+                    f"inputs: {name} has no path, so that nothing tells how many values "
+                    "each_section gives it: leave it out"
+                )
+            factors[name] = distribution
+            continue
         places = _places(base, name, distribution)
         for path in _paths_of(name, distribution):
             own = {with_number(base, f"{path}{place}") for place in places}
@@ -64,10 +81,21 @@ def draw(
         else:
             values = drawn[name]
         words = distribution.model_dump_json(exclude_none=True)
+        if name in free:
+            plain_name = re.sub(r"\W+", "_", name).strip("_")
+            columns.append(Column(plain_name, "", "", "1", words, values, input=name))
+        if name in free and not distribution.shared:
+            continue
         paths = _paths_of(name, distribution)
         columns += [
             replace(_column(base, path, values, words, design), input=name) for path in paths
         ]
+    for name, follower in followers.items():
+        source = next(each for each in columns if each.input == follower.follows)
+        values = follower.values_at(name, source.values)
+        words = follower.model_dump_json(exclude_none=True)
+        column = _column(base, name, values, words, design)
+        columns.append(replace(column, input=follower.follows))
     for name in () if inputs else drawn:
         if not is_label(name):
             refuse_fixed(base, name)
@@ -98,6 +126,11 @@ def draw(
         before.append(column.path)
     _check_extremes(base, table, design)
     return table
+
+
+def _is_number(law: Distribution) -> bool:
+    """Whether numbers are drawn: no part of a scene is one, so that ``temperature`` may be."""
+    return law.quantile(np.array([0.5])).dtype.kind in "iuf"
 
 
 def _paths_of(name: str, distribution: Distribution) -> tuple[str, ...]:
