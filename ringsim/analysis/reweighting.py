@@ -339,6 +339,11 @@ def weights_of(
             whole = (f"did you mean {n}?" for n, each in known.items() if path in paths_of(each))
             hint = next(whole, hint)
             raise InputError(f"--reweight {path}: is not a drawn input of this campaign ({hint})")
+        if new.follows:
+            raise InputError(
+                f'--reweight {path}: kind = "function" follows another input: give the new '
+                f"distribution to {new.follows}"
+            )
         values, old = known[path].to_numpy(), _drawn_from(campaign, path, known[path])
         _check_cover(path, old, new, len(values))
         ratio = new.log_density(values) - old.log_density(values)

@@ -56,7 +56,8 @@ def reference(kind):
 
 
 def test_every_kind_has_an_example():
-    assert set(kinds_of(Distribution)) == set(EXAMPLES)
+    """But those that are not drawn: tests/sampling/test_functions.py."""
+    assert set(kinds_of(Distribution)) - {"function"} == set(EXAMPLES)
 
 
 @pytest.mark.parametrize("kind", EXAMPLES)

@@ -53,6 +53,8 @@ def test_they_are_their_tables_of_what_was_drawn(tmp_path: Path) -> None:
     own = ringsim.simulate(scene, fidelity="frame")
     assert own["peak_tension"].item() == found["peak_tension"].values[5]
     told = ringsim.analyse(found)
+    with pytest.raises(InputError, match="follows another input"):
+        ringsim.analyse(found, reweighted={"temperature": INPUTS["cables.lower.axial_stiffness"]})
     assert set(told["input"].values) <= {"temperature", "lot = A", "lot = B"}
 
 
