@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis.campaign_notes import marked
 from ringsim.analysis.design import DIFFERENCE
 from ringsim.analysis.influence import (
     RANKS,
@@ -19,7 +20,6 @@ from ringsim.analysis.influence import (
 )
 from ringsim.analysis.intervals import ALIKE, LEVEL, hardly_apart, is_moment, quantities
 from ringsim.analysis.sensitivity import refusals
-from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, interval_text, number_text
 

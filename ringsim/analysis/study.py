@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 
 from ringsim.analysis import intervals
 from ringsim.analysis.accuracy import in_favour, settings_at
-from ringsim.analysis.campaign_notes import remark_lines
+from ringsim.analysis.campaign_notes import NOTE, OFF, attributes, off_counts, remark_lines
 from ringsim.analysis.derived import known_from
 from ringsim.analysis.design import (
     LOST,
@@ -47,8 +47,6 @@ from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge, stopping_lines
 from ringsim.analysis.worst import (
-    NOTE,
-    losses,
     margins,
     one_at_a_time,
     other_than_base,
@@ -135,7 +133,7 @@ def analyse(
             "samples": campaign.sizes["sample"], "samples_run": int(ran(campaign).sum()),
             "design": placed.kind, "intervals": placed.told,
             "learnt": "; ".join(learnt_lines(campaign)),
-            "stopping": "".join(stopping_lines(campaign, placed)), NOTE: losses(campaign).note,
+            "stopping": "".join(stopping_lines(campaign, placed)), **attributes(campaign),
             "remarks": "\n".join(remark_lines(campaign)),
             **({"outputs": campaign.attrs["outputs"]} if own else {}),
         },
@@ -156,6 +154,9 @@ def analyse(
     if note := found.attrs[NOTE]:
         for name in _bent(found):
             found[name].attrs[NOTE] = note
+    for name, words in off_counts(found.attrs).items():
+        if name in found:
+            found[name].attrs[OFF] = words
     return found
 
 

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ringsim.analysis.campaign_notes import losses
 from ringsim.analysis.courses import QUANTILES, ends
 from ringsim.analysis.design import (
     called,
@@ -34,7 +35,7 @@ from ringsim.analysis.intervals import (
     varies,
 )
 from ringsim.analysis.requirements import required_by
-from ringsim.analysis.worst import losses, one_at_a_time
+from ringsim.analysis.worst import one_at_a_time
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
 
