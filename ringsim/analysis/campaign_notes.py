@@ -87,7 +87,7 @@ _PLACES = re.compile(r"\b(upper|lower) \d+(?:, (?:(?:upper|lower) )?\d+)*(?: and
 def remark_lines(campaign: xr.Dataset) -> list[str]:
     """Remarks that runs make on their own numbers behind their reason, alike but for numbers and
     places: how many samples make each, with the first one's words.  What may be off ``off_note``
-    tells.
+    tells, and ``late_line`` drive margins of winches that start late.
     """
     if "reason" not in campaign:
         return []
@@ -95,7 +95,7 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
     held, reasons = good(campaign), campaign["reason"].to_numpy()
     for sample in np.flatnonzero(held).tolist():
         for remark in str(reasons[sample]).split("; ")[1:]:
-            if may_be_off(f"; {remark}")[0]:
+            if may_be_off(f"; {remark}")[0] or _LATE.match(remark):
                 continue
             kind = _NUMBER.sub("#", _PLACES.sub("#", remark))
             found.setdefault(kind, []).append((sample, remark))
@@ -104,6 +104,25 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
         f"in {_of(len(own), every)}, for example in sample {own[0][0]}: {own[0][1]}"
         for own in sorted(found.values(), key=len, reverse=True)
     ]
+
+
+_LATE = re.compile(r"the least drive margin is that of .* before .*?(?:: from then on (\S+) .*)?$")
+
+
+def late_line(campaign: xr.Dataset) -> str:
+    """In how many samples the least drive margin is that of a time before a winch starts, with the
+    words of the one that has the least from then on; empty if in none.
+    """
+    found, held = list[tuple[float, int, str]](), good(campaign)
+    for sample in np.flatnonzero(held).tolist() if "reason" in campaign else ():
+        for remark in str(campaign["reason"].values[sample]).split("; ")[1:]:
+            if late := _LATE.match(remark):
+                found.append((float(late[1] or "inf"), sample, remark))
+    if not found:
+        return ""
+    least, sample, remark = min(found)
+    which = "the worst of them sample" if np.isfinite(least) else "for example in sample"
+    return f"in {_of(len(found), int(held.sum()))}, {which} {sample}: {remark}"
 
 
 def _of(count: int, every: int) -> str:
@@ -267,6 +286,8 @@ DOUBTED = f"{DOUBT.strip()} may be off, since steps are too long for the shocks 
 """What is said below a table with that mark."""
 OFF = "may_be_off"
 """Attribute of an analysis with what ``off_note`` tells, as JSON."""
+LATE = "late_winches"
+"""Attribute with ``late_line``."""
 
 
 def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], str]:
@@ -286,12 +307,15 @@ _SETTING = re.compile(r"= ([\d.e+-]+)")
 
 
 def attributes(campaign: xr.Dataset) -> dict[str, str]:
-    """What marks all tables about a merged campaign: lost runs, and outputs that may be off."""
+    """What tables about a merged campaign must tell: lost runs, outputs that may be off, and drive
+    margins before a winch starts.
+    """
     found, cure = doubtful(campaign)
     counts = {name: int(own.sum()) for name, own in found.items()}
     counts = dict(sorted(counts.items(), key=lambda each: -each[1]))
     told = {"samples": counts, "of": int(good(campaign).sum()), "cure": cure}
-    return {NOTE: losses(campaign).note, **({OFF: json.dumps(told)} if counts else {})}
+    marks = {NOTE: losses(campaign).note, LATE: late_line(campaign)}
+    return marks | ({OFF: json.dumps(told)} if counts else {})
 
 
 def off_counts(says: Mapping[Any, Any]) -> dict[str, str]:

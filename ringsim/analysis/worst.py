@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import doubted, marked
+from ringsim.analysis.campaign_notes import LATE, doubted, marked
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -487,5 +487,6 @@ def margin_table(analysis: xr.Dataset) -> Table:
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"
     ] * any(name != _DRIVE for _, name, *_ in rows)
+    notes += filter(None, [analysis.attrs.get(LATE)])
     head = ("limit", "of", "worst value", "margin", "in sample")
     return marked(Table(head, rows, notes, left=2), analysis, 2)
