@@ -58,6 +58,7 @@ from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.stepping.instant import Array
+from ringsim.tables import unit_behind
 from ringsim.units import ListIn, Model
 from ringsim.variables import Status, about
 
@@ -321,7 +322,8 @@ def balance(campaign: xr.Dataset) -> dict[str, Any]:
         values = np.where(good(campaign), numbers(campaign, name), np.nan)
         _, count, largest, sample = root_mean_square(values, samples)
         if count:
-            names.append(str(campaign[name].attrs.get("long_name", name)))
+            says = campaign[name].attrs
+            names.append(unit_behind(str(says.get("long_name", name)), str(says.get("units", "1"))))
             rows.append((float(np.nanmedian(values)), largest, sample, count))
     columns = np.array(rows).reshape(-1, 4).T
     words = ("median", "largest", "sample", "samples")
