@@ -197,7 +197,7 @@ def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:
     worst = np.array([np.fmax.reduce(error[finer]) for finer in as_fine])
     # Settings that differ by what changes nothing are one: what is finer than one of them counts.
     _, same = np.unique(np.nan_to_num(error, nan=-1.0), axis=0, return_inverse=True)
-    worst = np.array([np.fmax.reduce(worst[same == own]) for own in same])
+    worst = np.array([np.fmax.reduce(worst[same.ravel() == own]) for own in same.ravel()])
     return np.where(np.isfinite(error), worst, np.nan) + uncertainty
 
 
