@@ -51,7 +51,8 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
 
     The cost is predicted from samples that are done; if there are none, one sample of middling
     cost runs as a trial, and nothing of it is kept.  So is that of checks by the judging engine,
-    but from the samples' own cost where a trial would take long.  ``say`` is told before a trial begins, which may take minutes.
+    but from the samples' own cost where a trial would take long.  ``say`` is told before a trial
+    begins, which may take minutes.
     """
     order.check()
     campaign, share = grown(order.campaign, order.folder), order.share
