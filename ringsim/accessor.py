@@ -235,13 +235,12 @@ class Ring:
         return found.bands.assign_attrs(self._losses())
 
     def _losses(self) -> dict[str, str]:
-        """The attribute that marks what lost runs bend; none for a run, and where they do not."""
-        from ringsim.analysis.worst import NOTE, losses
+        """The attributes that mark what lost runs bend or may be off; none for a run."""
+        from ringsim.analysis.campaign_notes import attributes
 
         dataset = self._dataset
         campaign = "sample" in dataset.dims and "status" in dataset
-        note = losses(dataset).note if campaign else ""
-        return {NOTE: note} if note else {}
+        return {k: v for k, v in attributes(dataset).items() if v} if campaign else {}
 
     def _require_samples(self, what: str) -> None:
         from ringsim.refusal import InputError

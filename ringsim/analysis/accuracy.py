@@ -194,7 +194,10 @@ def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:
     ``error`` has that shape, too, and ``uncertainty``, of the reference, shape (output,).
     """
     as_fine = [[a is b or _refines(a, b) for a in rungs] for b in rungs]
-    worst = [np.fmax.reduce(error[finer]) for finer in as_fine]
+    worst = np.array([np.fmax.reduce(error[finer]) for finer in as_fine])
+    # Settings that differ by what changes nothing are one: what is finer than one of them counts.
+    _, same = np.unique(np.nan_to_num(error, nan=-1.0), axis=0, return_inverse=True)
+    worst = np.array([np.fmax.reduce(worst[same.ravel() == own]) for own in same.ravel()])
     return np.where(np.isfinite(error), worst, np.nan) + uncertainty
 
 
@@ -258,8 +261,8 @@ _ADVICE = (
     "The cheapest setting for each error. The error of a setting is the largest one among this "
     "and all finer settings, plus the uncertainty of the reference: a single error may be small "
     "by chance. Errors are relative; for time series (opening angle, asynchrony) the largest "
-    "difference over the run counts. A setting other than the scene's own is named only if it is "
-    "at least a tenth cheaper."
+    "difference over the run counts. Where the scene's own setting is good for an error, another "
+    "one is named only if it is at least a tenth cheaper."
 )
 _COSTS = (
     "Errors of all settings, marked (bold or *) where no other setting is both cheaper and more "

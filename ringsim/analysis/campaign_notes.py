@@ -1,8 +1,10 @@
 """What a merged campaign says about its runs and their numerics, in lines for people."""
 
+import json
 import re
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,15 +16,19 @@ from ringsim.analysis.design import (
     NOT_RUN,
     REACHED,
     UNKNOWN,
+    blocks_of,
+    drawn,
     endings_of,
     kinds_of_ends,
     learnt_lines,
 )
-from ringsim.analysis.intervals import good, used, worst_sample
-from ringsim.analysis.worst import losses
+from ringsim.analysis.indices import UNLIKELY, dependence
+from ringsim.analysis.intervals import Mask, good, lost, ran, used, worst_sample
+from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
-from ringsim.tables import counted, known_to, readable, with_unit
+from ringsim.outputs.base import may_be_off
+from ringsim.tables import Table, chance_text, counted, known_to, readable, with_unit
 from ringsim.variables import Variable
 
 _NAMED = 6
@@ -80,7 +86,8 @@ _PLACES = re.compile(r"\b(upper|lower) \d+(?:, (?:(?:upper|lower) )?\d+)*(?: and
 
 def remark_lines(campaign: xr.Dataset) -> list[str]:
     """Remarks that runs make on their own numbers behind their reason, alike but for numbers and
-    places: how many samples make each, with the first one's words.
+    places: how many samples make each, with the first one's words.  What may be off ``off_note``
+    tells, and ``late_line`` drive margins of winches that start late.
     """
     if "reason" not in campaign:
         return []
@@ -88,17 +95,38 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
     held, reasons = good(campaign), campaign["reason"].to_numpy()
     for sample in np.flatnonzero(held).tolist():
         for remark in str(reasons[sample]).split("; ")[1:]:
+            if may_be_off(f"; {remark}")[0] or _LATE.match(remark):
+                continue
             kind = _NUMBER.sub("#", _PLACES.sub("#", remark))
             found.setdefault(kind, []).append((sample, remark))
     every = int(held.sum())
     return [
-        f"{_where(len(own), every)}, for example in sample {own[0][0]}: {own[0][1]}"
+        f"in {_of(len(own), every)}, for example in sample {own[0][0]}: {own[0][1]}"
         for own in sorted(found.values(), key=len, reverse=True)
     ]
 
 
-def _where(count: int, every: int) -> str:
-    return f"in all {every} samples" if count == every > 1 else f"in {count} of {every} samples"
+_LATE = re.compile(r"the least drive margin is that of .* before .*?(?:: from then on (\S+) .*)?$")
+
+
+def late_line(campaign: xr.Dataset) -> str:
+    """In how many samples the least drive margin is that of a time before a winch starts, with the
+    words of the one that has the least from then on; empty if in none.
+    """
+    found, held = list[tuple[float, int, str]](), good(campaign)
+    for sample in np.flatnonzero(held).tolist() if "reason" in campaign else ():
+        for remark in str(campaign["reason"].values[sample]).split("; ")[1:]:
+            if late := _LATE.match(remark):
+                found.append((float(late[1] or "inf"), sample, remark))
+    if not found:
+        return ""
+    least, sample, remark = min(found)
+    which = "the worst of them sample" if np.isfinite(least) else "for example in sample"
+    return f"in {_of(len(found), int(held.sum()))}, {which} {sample}: {remark}"
+
+
+def _of(count: int, every: int) -> str:
+    return f"all {every} samples" if count == every > 1 else f"{count} of {every} samples"
 
 
 def override_lines(campaign: xr.Dataset) -> list[str]:
@@ -134,13 +162,15 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
     Which end is the worst the output knows: margins and latch rates the least, loads the largest.
 
     Places have no names where samples differ in the ends at which the winches are.  Of outputs that
-    can have an error bar the line says how large that is in this sample, or else in others.
+    can have an error bar the line says how large that is in this sample, or else in others.  Behind
+    them stands what may be off.
     """
     spans = {}
     if "span_name" in campaign:
         names = campaign.span_name.transpose("plane", "span").values.tolist()
         spans = dict(zip(campaign.plane.values.tolist(), names, strict=True))
-    sound, lines, unknown, mark = used(campaign), [], False, losses(campaign).mark
+    says = attributes(campaign)
+    sound, lines, unknown, mark = used(campaign), [], False, MARK * bool(says[NOTE])
     for output in OUTPUTS:
         for variable in output.variables:
             if variable.summary is None or (sample := worst_sample(sound, variable)) < 0:
@@ -157,13 +187,14 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                     unknown |= not error
                     number = known_to(number, readable(variable.units, bar)[0] * bar)
                 said = " ".join([number, *told])
-                lines.append(f"{variable.summary[0]} in sample {sample}: {said}{error}{mark}")
+                name = variable.summary[0] + DOUBT * (f'"{variable.name}"' in says.get(OFF, ""))
+                lines.append(f"{name} in sample {sample}: {said}{error}{mark}")
     if unknown:
         lines.append(
             "no sample has numerical error bars: set error_bars_every in the campaign file, or "
             "solver.error_bars = true for the scenes of the samples named here"
         )
-    return lines
+    return [*lines, *filter(None, [off_note(says)])]
 
 
 def _of_others(sound: xr.Dataset, variable: Variable) -> tuple[float, str]:
@@ -177,3 +208,147 @@ def _of_others(sound: xr.Dataset, variable: Variable) -> tuple[float, str]:
     most = with_unit(f"{largest:.2g}", variable.units)
     others = counted(stated.size, "other sample")
     return largest, f"; largest error bar of {others}: {most}"
+
+
+# Lost runs that bend what the others tell: which lines they bend, and the mark on these.
+#
+# Runs that are lost where inputs have certain values leave another population behind: its mean,
+# quantiles and shares are not those of the antenna, and their intervals tell nothing of that.
+
+
+MARK = " *"
+"""Stands behind what lost runs bend."""
+_OF_LOSSES = "failed"
+"""How names of groups and outcomes begin that are those of lost runs: all that ran tell them."""
+NOTE = "lost_runs"
+"""Attribute that says why, of an analysis and of each of its variables that is bent."""
+
+
+@dataclass(frozen=True)
+class Losses:
+    """The lost runs of a campaign, and whether they go with inputs."""
+
+    count: int
+    ran: int
+    chance: float
+    """Probability that runs lost at random go with inputs as much; NaN if none is lost."""
+
+    @property
+    def note(self) -> str:
+        """Why statistics are bent, in words; empty if they are not, as far as one can tell."""
+        if not self.chance < UNLIKELY:
+            return ""
+        return (
+            f"{self.count} of {self.ran} runs failed, and whether one fails depends on the "
+            f"inputs ({chance_text(self.chance)}): numbers marked{MARK} are from the other "
+            f"{self.ran - self.count} alone, which are not representative, and may be far off "
+            "(run the failed ones again: ringsim campaign --retry-failed, or narrow the inputs)"
+        )
+
+    @property
+    def mark(self) -> str:
+        """What stands behind a line that they bend; empty if they do not."""
+        return MARK if self.note else ""
+
+
+def losses(campaign: xr.Dataset) -> Losses:
+    """The lost runs of a merged campaign; subset simulation takes them as no event, and says so."""
+    run, gone = ran(campaign), lost(campaign)
+    count, chance = int(gone.sum()), np.nan
+    if count and subset_simulation(campaign.attrs) is None:
+        blocks, block = blocks_of(campaign), None
+        if blocks is not None:
+            block = np.unique(np.arange(len(run))[run] // blocks.size, return_inverse=True)[1]
+        chance = dependence(gone[run], drawn(campaign).values[run], block)
+    return Losses(count, int(run.sum()), chance)
+
+
+def marked(table: Table, analysis: xr.Dataset, column: int = 0) -> Table:
+    """A table with the mark in one column of each row, but of those about lost runs, if an analysis
+    says that its statistics are bent.
+    """
+    if not analysis.attrs.get(NOTE):
+        return table
+    rows, own = [], False
+    for row in table.rows:
+        own = row[0].startswith(_OF_LOSSES) if row[0] else own  # a blank repeats the one above
+        mark = "" if own else MARK
+        rows.append((*row[:column], f"{row[column]}{mark}", *row[column + 1 :]))
+    return table._replace(rows=rows)
+
+
+# Outputs that runs call uncertain themselves, and the mark on them.
+
+
+DOUBT = " ?"
+"""Stands behind what may be off."""
+DOUBTED = f"{DOUBT.strip()} may be off, since steps are too long for the shocks of locks"
+"""What is said below a table with that mark."""
+OFF = "may_be_off"
+"""Attribute of an analysis with what ``off_note`` tells, as JSON."""
+LATE = "late_winches"
+"""Attribute with ``late_line``."""
+
+
+def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], str]:
+    """By output the samples in which it may be off, by what their runs say, and what cures all."""
+    held, found, cures = good(campaign), dict[str, Mask](), list[tuple[float, str]]()
+    reasons = campaign["reason"].to_numpy() if "reason" in campaign else np.full(len(held), "")
+    for place in np.flatnonzero(held).tolist():
+        names, cure = may_be_off(str(reasons[place]))
+        for name in names:
+            found.setdefault(name, np.zeros(len(held), dtype=bool))[place] = True
+        if value := _SETTING.search(cure):
+            cures.append((float(value[1]), cure))
+    return found, min(cures, default=(0.0, ""))[1]
+
+
+_SETTING = re.compile(r"= ([\d.e+-]+)")
+
+
+def attributes(campaign: xr.Dataset) -> dict[str, str]:
+    """What tables about a merged campaign must tell: lost runs, outputs that may be off, and drive
+    margins before a winch starts.
+    """
+    found, cure = doubtful(campaign)
+    counts = {name: int(own.sum()) for name, own in found.items()}
+    counts = dict(sorted(counts.items(), key=lambda each: -each[1]))
+    told = {"samples": counts, "of": int(good(campaign).sum()), "cure": cure}
+    marks = {NOTE: losses(campaign).note, LATE: late_line(campaign)}
+    return marks | ({OFF: json.dumps(told)} if counts else {})
+
+
+def off_counts(says: Mapping[Any, Any]) -> dict[str, str]:
+    """By output in how many samples it may be off, in words, out of ``attributes``."""
+    told = json.loads(says.get(OFF, "{}"))
+    return {name: _of(count, told["of"]) for name, count in told.get("samples", {}).items()}
+
+
+def off_note(says: Mapping[Any, Any]) -> str:
+    """The same in a line with the cure; empty if none may be off."""
+    if OFF not in says:
+        return ""
+    told = json.loads(says[OFF])
+    (first, count), *others = told["samples"].items()
+    more = "".join(f", {name} in {number}" for name, number in others)
+    of = counted(told["of"], "sample")
+    return f"{DOUBTED}: {first} in {count} of {of}{more}; {told['cure']}"
+
+
+def doubted(table: Table, says: Mapping[Any, Any], said: str = DOUBTED) -> Table:
+    """A table with the mark behind the names of outputs that may be off, wherever it has them, and
+    what is ``said`` of it below, out of ``attributes``.
+    """
+    if not (names := off_counts(says)):
+        return table
+    named = re.compile(rf"\b({'|'.join(names)})\b")
+
+    def mark(words: Sequence[str]) -> list[str]:
+        return [named.sub(rf"\1{DOUBT}", each) for each in words]
+
+    found = table._replace(
+        head=mark(table.head), rows=[mark(row) for row in table.rows],
+        notes=mark(table.notes), title=mark([table.title])[0],
+    )  # fmt: skip
+    every = [found.title, *found.head, *found.notes, *(cell for row in found.rows for cell in row)]
+    return found._replace(notes=[*found.notes, *[said] * any(DOUBT in each for each in every)])

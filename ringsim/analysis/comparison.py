@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
+from ringsim.analysis.campaign_notes import NOTE, losses
 from ringsim.analysis.derived import known_from
 from ringsim.analysis.design import (
     LOST,
@@ -42,7 +43,7 @@ from ringsim.analysis.requirements import (
 )
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.verdicts import Verdict, judge
-from ringsim.analysis.worst import NOTE, losses, margins
+from ringsim.analysis.worst import margins
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
 from ringsim.sampling.distributions import law_text

@@ -249,7 +249,9 @@ OUTPUTS = {
     "peak_tension": "peak tension",
     "peak_rod_stress": "peak stress",
     "peak_bending_strain": "peak strain",
+    "least_latch_rate": "least latch rate",
     "peak_latch_rate": "peak latch rate",
+    "peak_lock_impulse": "lock impulse",
 }
 """What people use of a result, as far as a scene has it, and its name in tables."""
 LEAST_ASYNCHRONY = 1e-3

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis.campaign_notes import marked
 from ringsim.analysis.design import DIFFERENCE
 from ringsim.analysis.influence import (
     RANKS,
@@ -19,7 +20,6 @@ from ringsim.analysis.influence import (
 )
 from ringsim.analysis.intervals import ALIKE, LEVEL, hardly_apart, is_moment, quantities
 from ringsim.analysis.sensitivity import refusals
-from ringsim.analysis.worst import marked
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, interval_text, number_text
 
@@ -366,19 +366,20 @@ def what_matters(analysis: xr.Dataset) -> Table:
         notes.append("difference: how far the planes' inputs are apart, whichever is the larger")
     if alone:
         notes.append(
-            f"listed by the index alone, without a significant rank correlation: {', '.join(alone)}"
-            ": an effect that rises and falls, or chance"
+            "listed by the index alone, since their rank correlation is not significant among "
+            f"{counted(analysis.sizes['input'], 'input')} that are compared: {', '.join(alone)}: "
+            "an effect that rises and falls, a threshold, or chance"
         )
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         count = counted(analysis.sizes["input"], "input")
         twice = measure in _CHANCE and bool(_correlated(analysis))
         how = " by its index or its partial rank correlation" * twice
         outputs, often = len(quiet) + sum(bool(row[0]) for row in rows), 10 if twice else 20
-        many = f", so up to {outputs / often:.2g} of these {outputs}" * (outputs >= often)
+        many = f", so up to {outputs / often:.2g} of the {outputs} outputs tested"
         notes.append(
             f"by chance alone, fewer than one output in {often} would have an input listed{how}"
-            f"{many} ({count} in all, sections, means and differences included); of a mean and its "
-            "parts only the strongest is listed"
+            f"{many * (outputs >= often)} ({count} in all, sections, means and differences "
+            "included); of a mean and its parts only the strongest is listed"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if more:

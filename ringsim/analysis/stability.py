@@ -1,6 +1,7 @@
 """The stability map: how each cell (one run) ended, why, and whether "ok" was true."""
 
 import itertools
+import textwrap
 from collections import Counter
 from collections.abc import Sequence
 
@@ -99,7 +100,19 @@ def _told(cell: xr.Dataset, word: str) -> str:
     if word in JUDGED:
         return f"{cell[word].item():.6g} ± {cell[f'{word}_error'].item():.2g}"
     status = Status(int(cell["status"])).word
-    return f"{status}, {cell['cause'].item() or 'goal'}: {cell['reason'].item()[:_LONGEST_OF_BOTH]}"
+    reason = _shortened(cell["reason"].item(), _LONGEST_OF_BOTH)
+    return f"{status}, {cell['cause'].item() or 'goal'}: {reason}"
+
+
+def _shortened(reason: str, most: int) -> str:
+    """The first clause of a reason, and as many further ones as there is room for."""
+    first, *others = reason.split("; ")
+    told = textwrap.shorten(first, most, placeholder=" ...")
+    for clause in others:
+        if len(told) + len(clause) > most:
+            break
+        told += f"; {clause}"
+    return told
 
 
 # The stability map: how each cell (one run) ended, why, and whether "ok" was true.
@@ -285,13 +298,15 @@ def summary(whole: xr.Dataset) -> str:
 def _checks(whole: xr.Dataset) -> list[str]:
     count = Counter(whole["check"].values.tolist())
     time, angle, tension = PROMISES.values()
+    cells = counted(count.total() - count[""], "random ok cell")
     text = (
-        f"{count.total() - count['']} random ok cells were run again with a quarter of the step "
-        f"and a sixteenth of the tolerance: {count['holds']} agreed within the tolerance "
+        f"{cells} {'was' if cells.startswith('1 ') else 'were'} run again with a quarter of the "
+        f"step and a sixteenth of the tolerance: {count['holds']} agreed within the tolerance "
         f"({100 * time:g} % of the deployment time, {angle:g} deg of the mean angle in runs that "
         f"ended earlier, {100 * tension:g} % of the largest tension), {count['differs']} did "
         f"not, {count['unproven']} could not be decided, because the finer run was not completed "
-        "or hardly finer."
+        "or hardly finer. Latch rates, lock impulses and base loads, which steps at locks decide, "
+        "are not compared: runs say themselves where these may be off."
     )
     words = ("- deployment time", "%"), ("- mean angle", "deg"), ("- largest tension", "%")
     lines = []
@@ -345,7 +360,7 @@ def _causes(whole: xr.Dataset) -> str:
     causes, reasons = (others[name].values.astype(str) for name in ("cause", "reason"))
     words, first, counts = np.unique(causes, return_index=True, return_counts=True)
     rows = [
-        [words[k] or WRONG, counts[k], reasons[first[k]][:_LONGEST_REASON]]
+        [words[k] or WRONG, counts[k], _shortened(reasons[first[k]], _LONGEST_REASON)]
         for k in np.argsort(-counts, kind="stable")
     ]
     return markdown_table(["cause", "cells", "for example"], rows)

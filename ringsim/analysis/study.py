@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 
 from ringsim.analysis import intervals
 from ringsim.analysis.accuracy import in_favour, settings_at
-from ringsim.analysis.campaign_notes import remark_lines
+from ringsim.analysis.campaign_notes import NOTE, OFF, attributes, off_counts, remark_lines
 from ringsim.analysis.derived import known_from
 from ringsim.analysis.design import (
     LOST,
@@ -47,8 +47,6 @@ from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge, stopping_lines
 from ringsim.analysis.worst import (
-    NOTE,
-    losses,
     margins,
     one_at_a_time,
     other_than_base,
@@ -60,6 +58,7 @@ from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.stepping.instant import Array
+from ringsim.tables import unit_behind
 from ringsim.units import ListIn, Model
 from ringsim.variables import Status, about
 
@@ -135,7 +134,7 @@ def analyse(
             "samples": campaign.sizes["sample"], "samples_run": int(ran(campaign).sum()),
             "design": placed.kind, "intervals": placed.told,
             "learnt": "; ".join(learnt_lines(campaign)),
-            "stopping": "".join(stopping_lines(campaign, placed)), NOTE: losses(campaign).note,
+            "stopping": "".join(stopping_lines(campaign, placed)), **attributes(campaign),
             "remarks": "\n".join(remark_lines(campaign)),
             **({"outputs": campaign.attrs["outputs"]} if own else {}),
         },
@@ -156,6 +155,9 @@ def analyse(
     if note := found.attrs[NOTE]:
         for name in _bent(found):
             found[name].attrs[NOTE] = note
+    for name, words in off_counts(found.attrs).items():
+        if name in found:
+            found[name].attrs[OFF] = words
     return found
 
 
@@ -320,7 +322,8 @@ def balance(campaign: xr.Dataset) -> dict[str, Any]:
         values = np.where(good(campaign), numbers(campaign, name), np.nan)
         _, count, largest, sample = root_mean_square(values, samples)
         if count:
-            names.append(str(campaign[name].attrs.get("long_name", name)))
+            says = campaign[name].attrs
+            names.append(unit_behind(str(says.get("long_name", name)), str(says.get("units", "1"))))
             rows.append((float(np.nanmedian(values)), largest, sample, count))
     columns = np.array(rows).reshape(-1, 4).T
     words = ("median", "largest", "sample", "samples")

@@ -7,7 +7,16 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.design import FAILED_RUNS, placement, population_of
+from ringsim.analysis.campaign_notes import (
+    DOUBTED,
+    MARK,
+    NOTE,
+    attributes,
+    doubted,
+    marked,
+    off_note,
+)
+from ringsim.analysis.design import placement, population_of
 from ringsim.analysis.influence_text import (
     FEW_DECIDE,
     influence_tables,
@@ -26,7 +35,7 @@ from ringsim.analysis.intervals import (
     quantities,
     ranks,
 )
-from ringsim.analysis.requirements import OUTCOME, required_by
+from ringsim.analysis.requirements import required_by
 from ringsim.analysis.reweighting import (
     LEAST_OF_MEAN,
     LEAST_OF_SHARE,
@@ -37,22 +46,22 @@ from ringsim.analysis.reweighting import (
 from ringsim.analysis.sensitivity import refusals
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
-from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
-from ringsim.analysis.worst import (
-    MARK,
-    NOTE,
-    losses,
-    margin_table,
-    margins,
-    marked,
-    worst_lines,
-    worst_tables,
+from ringsim.analysis.verdicts import (
+    BOUND,
+    SHARE_MET,
+    Verdict,
+    decisive,
+    judge,
+    stopping_lines,
+    verdict_about,
+    verdict_table,
+    verdict_text,
 )
+from ringsim.analysis.worst import margin_table, margins, worst_lines, worst_tables
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import law_text
 from ringsim.tables import (
     Table,
-    bound_text,
     counted,
     digits_of,
     estimate_text,
@@ -76,7 +85,6 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
     """Which distributions, how many effective samples, then the estimates beside the old ones."""
     if "reweighted_to" not in analysis:
         return []
-    bent = MARK * bool(analysis.attrs.get(NOTE))
     laws = json.loads(analysis["reweighted_to"].item())
     law_words = "; ".join(f"{path} {law_text(law)}" for path, law in laws.items())
     first = Table((), (), [
@@ -98,7 +106,7 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
                 one[name], one[f"{name}_reweighted"], *one[f"{name}_reweighted_interval"]
             ])  # fmt: skip
             rows.append((
-                f"{name}{THIN * few}{bent}", unit, statistic.replace("_", " "),
+                f"{name}{THIN * few}", unit, statistic.replace("_", " "),
                 number_text(drawn), estimate_text(reweighted, low, high),
                 FEW_DECIDE if low < 0.0 <= lowest else interval_text(low, high),
                 number_text(one[f"{name}_effective_samples"].item(), 3), number_text(decisive, 3),
@@ -110,7 +118,7 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
         few = decisive < LEAST_OF_SHARE
         thin |= few
         shares.append((
-            f"{event}{THIN * few}{'' if event == FAILED_RUNS else bent}",
+            f"{event}{THIN * few}",
             estimate_text(one["reweighted_share"].item(), *ends),
             interval_text(*ends),
             number_text(decisive, 3),
@@ -130,7 +138,8 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
     head = ("output", "unit", "statistic", "as drawn", "reweighted", "95 % interval",
             "effective samples", "that determine it")  # fmt: skip
     of_shares = ("probability of", "reweighted", "95 % interval", "samples that determine it")
-    found = [first, Table(head, rows), Table(of_shares, shares, notes)]
+    tables = Table(head, rows), Table(of_shares, shares, notes)
+    found = [first, *(marked(table, analysis) for table in tables)]
     return [*found, _verdicts(analysis)] if "reweighted_verdict" in analysis else found
 
 
@@ -144,20 +153,14 @@ def _verdicts(analysis: xr.Dataset) -> Table:
             f"{one['confidence_required'].item():g}",
             Verdict(one["reweighted_verdict"].item()).words,
             number_text(one["reweighted_probability"].item()),
-            _decisive(Verdict(one["reweighted_verdict"].item()), *one["reweighted_bounds"].values),
+            decisive(Verdict(one["reweighted_verdict"].item()), *one["reweighted_bounds"].values),
         ))  # fmt: skip
-    head = ("requirement, reweighted", "probability", "confidence", "verdict", _MET,
-            _BOUND)  # fmt: skip
-    return marked(Table(head, rows), analysis, head.index(_MET))
+    head = ("requirement, reweighted", "probability", "confidence", "verdict", SHARE_MET,
+            BOUND)  # fmt: skip
+    return marked(Table(head, rows), analysis, head.index(SHARE_MET))
 
 
 # An analysis of a campaign as lines for people.
-
-
-_HINT = (
-    '; set a requirement on the outcome, too: outcome = { is = "deployed", probability = P, '
-    "confidence = C }"
-)
 
 
 class Section(NamedTuple):
@@ -202,10 +205,16 @@ def sections(
         Section("requirements", "Requirements", [margin_table(analysis), verdict_table(analysis)]),
         Section("reweighting", "Other distributions", reweighting_tables(analysis)),
     )
+    says = analysis.attrs
+
+    def kept(of: Section, tables: Sequence[Table]) -> list[Table]:
+        said = off_note(says) if of.name == "statistics" else DOUBTED
+        return [doubted(each, says, said) for each in tables if each.rows or each.notes]
+
     return {
-        each.name: each._replace(tables=tables, more=[m for m in each.more if m.rows or m.notes])
+        each.name: each._replace(tables=list(map(slim, tables)), more=kept(each, each.more))
         for each in found
-        if (tables := [slim(t) for t in each.tables if t.rows or t.notes])
+        if (tables := kept(each, each.tables))
     }
 
 
@@ -277,123 +286,35 @@ def head_lines(analysis: xr.Dataset) -> list[str]:
 
 def verdict_lines(campaign: xr.Dataset) -> list[str]:
     """The verdicts on the requirements of a merged campaign's own file; none without any."""
-    placed, lost = placement(campaign), losses(campaign)
+    placed, says = placement(campaign), attributes(campaign)
     found = xr.Dataset(tail(campaign), attrs={"samples": campaign.sizes["sample"]})
-    lines = [*filter(None, [lost.note])]
-    lines += [line + lost.mark for line in stopping_lines(campaign, placed)]
+    lines = [*filter(None, [says[NOTE]])]
+    lines += [line + MARK * bool(says[NOTE]) for line in stopping_lines(campaign, placed)]
     lines += tail_table(found).lines()
-    known = margins(campaign).assign_attrs({NOTE: lost.note})
-    lines += slim(margin_table(known)).lines() if known.data_vars else []
+    known = margins(campaign).assign_attrs(says)
+    lines += slim(doubted(margin_table(known), says)).lines() if known.data_vars else []
     try:
         found = judge(population_of(campaign), required_by(campaign.attrs), placed)
     except InputError as error:
         return [*lines, f"the requirements cannot be checked: {error}"]
-    return [*lines, *slim(verdict_table(found.assign_attrs({NOTE: lost.note}))).lines()]
+    return [*lines, *slim(doubted(verdict_table(found.assign_attrs(says)), says)).lines()]
 
 
 def not_met(analysis: xr.Dataset) -> list[str]:
-    """The requirements that are not met, or not yet shown to be, each with its verdict, and samples
-    that are left; empty if all is done and met.
+    """The requirements that are not met, not yet shown to be, or only if numbers hold that may be
+    off, each with its verdict, and samples that are left; empty if all is done and met.
     """
     if "requirement" not in analysis.dims:
         return []
     run, samples = analysis.attrs["samples_run"], analysis.attrs["samples"]
     # Those that are left may be the slow ones, and the slow ones those that fail.
     left = [f"{samples - run} of {samples} samples have not run"] if run < samples else []
-    codes, texts = (analysis[name].values for name in ("verdict", "requirement_text"))
-    each = zip(codes, texts, strict=True)
-    bad = [f"{text} is {Verdict(code).words}" for code, text in each if code != Verdict.MET]
+    each = [verdict_about(analysis, name) for name in analysis["requirement"].values]
+    bad = [
+        f"{one['requirement_text']} is {verdict_text(one)}" for one in each
+        if one["verdict"] != Verdict.MET or one["verdict_may_change"]
+    ]  # fmt: skip
     return [*bad, *left]
-
-
-def verdict_table(analysis: xr.Dataset) -> Table:
-    """The verdicts, a row a requirement; no rows without requirements."""
-    rows, notes, chosen = [], list[str](), False
-    never = dict[tuple[str, str], list[str]]()
-    for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
-        variables = analysis.sel(requirement=name).variables
-        one = {str(n): v.values.item() for n, v in variables.items() if not v.dims}
-        verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
-        further = one["further_samples"]
-        bad, used = one["samples_violating"], one["samples_used"]
-        if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
-            one["probability"], chosen = np.nan, True
-            notes.append(f"{name}: {bad} of {used} samples violate it")
-        rows.append((
-            one["requirement_text"], f"{one['probability_required']:g}",
-            f"{one['confidence_required']:g}", verdict.words, number_text(one["probability"]),
-            _decisive(verdict, one["probability_lower"], one["probability_upper"]),
-            str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
-            alone.words if one["samples_lost"] else "-", str(further) if further > 0 else "-",
-        ))  # fmt: skip
-        if further > 0:
-            more = counted(further, "further sample")
-            taken = counted(one["samples_lost"], "failed run")
-            kept = f" (if the {taken} are counted as violations)" * bool(one["samples_lost"])
-            so_far = f"{bad} of {used} violate it so far; " * bool(bad)
-            notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
-        if bad and verdict != Verdict.NO_POPULATION:
-            low = bound_text(1.0 - one["probability_upper"], upper=False)
-            high = bound_text(1.0 - one["probability_lower"], upper=True)
-            notes.append(
-                f"{name}: violated with a probability of {number_text(1.0 - one['probability'])} "
-                f"({low} .. {high}, each bound with the confidence required)"
-            )
-        elif not bad and used and np.isfinite(one["probability_lower"]):
-            most = bound_text(1.0 - one["probability_lower"], 3, upper=True)
-            never.setdefault((most, f"{one['confidence_required']:g}"), []).append(str(name))
-        if verdict != alone:
-            notes.append(
-                f"{name}: without the failed runs it would be {alone.words}; run them again "
-                "(ringsim campaign --retry-failed)"
-            )
-        if not one["samples_used"]:
-            notes.append(f"{name}: no sample has a valid result for it")
-        if short := one.get("samples_short"):
-            held = one["samples_used"] - one["samples_violating"]
-            hint = "" if OUTCOME in analysis["requirement"] else _HINT
-            notes.append(
-                f"{name}: {short} of the {held} samples that meet it ended before the antenna was "
-                f"deployed, and might have violated it later{hint}"
-            )
-        if missing := one["samples_without_value"]:
-            notes.append(
-                f"{name}: violations without a value (the antenna did not get that far): {missing}"
-            )
-    notes = [
-        f"no sample violates {', '.join(names)}: the probability of a violation is at most {most} "
-        f"(confidence {level})"
-        for (most, level), names in never.items()
-    ] + notes
-    if rows:
-        notes.insert(0, _CHOSEN if chosen else _DECIDES)
-    head = (
-        f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
-        "verdict", _MET, _BOUND, "samples used", "violating", "failed runs",
-        "verdict without failed runs", "samples to go",
-    )  # fmt: skip
-    return marked(Table(head, rows, notes), analysis, head.index(_MET))
-
-
-_MET = "share that meets it"
-_BOUND = "one-sided bound"
-_DECIDES = (
-    "the one-sided bound, at the confidence required, decides each verdict; where neither the "
-    "lower nor the upper bound decides, both are given"
-)
-
-
-_CHOSEN = "these samples stand for no population: there is no probability to estimate"
-
-
-def _decisive(verdict: Verdict, low: float, high: float) -> str:
-    """The bound of a probability that decides a verdict; both where neither does."""
-    least, most = bound_text(low, upper=False), bound_text(high, upper=True)
-    if verdict is Verdict.MET:
-        return f"at least {least}"
-    if verdict is Verdict.NOT_MET:
-        return f"at most {most}"
-    return f"at least {least}, at most {most}" if np.isfinite([low, high]).all() else "-"
 
 
 def outcome_table(analysis: xr.Dataset) -> Table:
@@ -593,8 +514,7 @@ def error_lines(campaign: xr.Dataset) -> list[str]:
     """Statistics and errors of those outputs of a merged campaign that have error bars."""
     stand = population_of(campaign)
     barred = [n for n in quantities() if np.isfinite(numbers(stand, f"{n}_error")).any()]
-    found = xr.Dataset(
-        statistics(stand, placement(campaign), barred), attrs={NOTE: losses(campaign).note}
-    )
+    found = xr.Dataset(statistics(stand, placement(campaign), barred), attrs=attributes(campaign))
     tables = [statistics_table(found), *error_tables(found)]
-    return [line for table in tables if table.rows for line in slim(table).lines()]
+    tables = [slim(doubted(table, found.attrs)) for table in tables if table.rows]
+    return [line for table in tables for line in table.lines()]

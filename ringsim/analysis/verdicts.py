@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ringsim.analysis.campaign_notes import doubtful, marked
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import (
     Interval,
@@ -29,7 +30,7 @@ from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, 
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
 from ringsim.refusal import known_or_nearest
-from ringsim.tables import counted, number_text, with_unit
+from ringsim.tables import Table, bound_text, counted, number_text, with_unit
 from ringsim.units import Model
 from ringsim.variables import GOALS, Code, Fate, about, flags_of
 
@@ -217,9 +218,12 @@ def judge(
 
     rule = rule_of(campaign.attrs)
     columns: dict[str, list[float]] = {name: [] for name in _MEANING}
+    none = np.zeros(campaign.sizes["sample"], dtype=bool)
+    doubted = doubtful(campaign)[0] if requirements else {}
     for name, wanted in requirements.items():
         require_values(campaign, name)
-        for key, value in _judged(campaign, name, wanted, placed, rule).items():
+        off = doubted.get(name, none)
+        for key, value in _judged(campaign, name, wanted, placed, rule, off).items():
             columns[key].append(value)
     known = {
         name: ("requirement", np.array(columns[name], dtype=kind), about(words))
@@ -253,6 +257,8 @@ _MEANING = {
     "samples_lost": ("samples whose run failed", "i8"),
     "samples_violating": ("samples used that violate the requirement", "i8"),
     "samples_without_value": ("of these, samples without a value", "i8"),
+    "samples_may_be_off": ("samples used whose value may be off, by what their runs say", "i8"),
+    "verdict_may_change": ("whether those could change the verdict, were they wrong", "i1"),
     "samples_short": ("samples that meet it and ended before their goal", "i8"),
     "further_samples": (
         "further samples without a violation that would prove it; -1: no number would", "i8"),
@@ -264,8 +270,9 @@ _FINAL = ("deployment_time", "asynchrony_max", "least_latch_rate", "peak_latch_r
 
 
 def _judged(
-    campaign: xr.Dataset, name: str, wanted: Requirement, placed: Placement, rule: Rule | None
-) -> dict[str, float]:
+    campaign: xr.Dataset, name: str, wanted: Requirement, placed: Placement, rule: Rule | None,
+    off: Mask,
+) -> dict[str, float]:  # fmt: skip
     used, gone = good(campaign), lost(campaign)
     broken = violations(campaign, name, wanted)
     absent = used & np.isnan(numbers(campaign, name)) if name != OUTCOME else ~used & used
@@ -278,16 +285,22 @@ def _judged(
     looked = int((campaign["status"].to_numpy() >= 0).sum())
     if rule is not None:
         levels = rule.levels(name, wanted, looked, placed.replicates)
-    low, high = 0.0, 1.0
+    low, high, change = 0.0, 1.0, False
     verdict = alone = Verdict.NOT_YET_SHOWN
     if count:
         alone = verdict_of(*bounds(~broken[used], place[used], levels, placed), wanted.probability)
         run = used | gone
-        low, high = (
-            bounds(kept[run], place[run], levels, placed)[k]
-            for k, kept in enumerate((~(broken | gone), ~broken))
-        )
+
+        def ends(least: Mask, most: Mask) -> Interval:
+            """By the samples that keep to it at least, and at most."""
+            low, high = (bounds(kept[run], place[run], levels, placed) for kept in (least, most))
+            return low[0], high[1]
+
+        least, most = ~(broken | gone), ~broken
+        low, high = ends(least, most)
         verdict = verdict_of(low, high, wanted.probability)
+        if off.any() and verdict != Verdict.NOT_YET_SHOWN:
+            change = verdict != verdict_of(*ends(least & ~off, most | off), wanted.probability)
     further = -1
     if count and verdict == Verdict.NOT_YET_SHOWN:
         if rule is not None and rule.judges(name):
@@ -297,7 +310,7 @@ def _judged(
             further = max(needed - count - missing, 0) or -1
     if not placed.population:
         verdict = alone = Verdict.NO_POPULATION
-        low, high, further = np.nan, np.nan, -1
+        low, high, further, change = np.nan, np.nan, -1, False
     return {
         "probability_required": wanted.probability, "confidence_required": wanted.confidence,
         "confidence_lower": levels[0], "confidence_upper": levels[1],
@@ -306,9 +319,19 @@ def _judged(
         "probability_lower": low, "probability_upper": high,
         "samples_used": count, "samples_lost": missing, "samples_violating": bad,
         "samples_without_value": int(absent.sum()),
+        "samples_may_be_off": int(off.sum()), "verdict_may_change": change,
         "samples_short": int(short.sum()) if name != OUTCOME else 0,
         "further_samples": further,
     }  # fmt: skip
+
+
+def verdict_text(one: Mapping[str, Any]) -> str:
+    """A verdict of ``judge`` in words, with how many values may be off if these could change it."""
+    words = Verdict(one["verdict"]).words
+    if not one["verdict_may_change"]:
+        return words
+    off, used = one["samples_may_be_off"], one["samples_used"]
+    return f"{words}, if its numbers hold: may be off in {off} of {counted(used, 'sample')}"
 
 
 def _ended_short(campaign: xr.Dataset) -> Mask:
@@ -323,6 +346,110 @@ def verdict_of(low: float, high: float, probability: float) -> Verdict:
     if low >= probability:
         return Verdict.MET
     return Verdict.NOT_MET if high < probability else Verdict.NOT_YET_SHOWN
+
+
+# Verdicts as a table.
+
+
+_HINT = (
+    '; set a requirement on the outcome, too: outcome = { is = "deployed", probability = P, '
+    "confidence = C }"
+)
+
+
+def verdict_about(analysis: xr.Dataset, name: str) -> dict[str, Any]:
+    """All about one requirement."""
+    variables = analysis.sel(requirement=name).variables
+    return {str(n): v.values.item() for n, v in variables.items() if not v.dims}
+
+
+def verdict_table(analysis: xr.Dataset) -> Table:
+    """The verdicts, a row a requirement; no rows without requirements."""
+    rows, notes, chosen = [], list[str](), False
+    never = dict[tuple[str, str], list[str]]()
+    for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
+        one = verdict_about(analysis, name)
+        verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
+        further = one["further_samples"]
+        bad, used = one["samples_violating"], one["samples_used"]
+        if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
+            one["probability"], chosen = np.nan, True
+            notes.append(f"{name}: {bad} of {used} samples violate it")
+        rows.append((
+            one["requirement_text"], f"{one['probability_required']:g}",
+            f"{one['confidence_required']:g}", verdict_text(one), number_text(one["probability"]),
+            decisive(verdict, one["probability_lower"], one["probability_upper"]),
+            str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
+            alone.words if one["samples_lost"] else "-", str(further) if further > 0 else "-",
+        ))  # fmt: skip
+        if further > 0:
+            more = counted(further, "further sample")
+            taken = counted(one["samples_lost"], "failed run")
+            kept = f" (if the {taken} are counted as violations)" * bool(one["samples_lost"])
+            so_far = f"{bad} of {used} violate it so far; " * bool(bad)
+            notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
+        if bad and verdict != Verdict.NO_POPULATION:
+            low = bound_text(1.0 - one["probability_upper"], upper=False)
+            high = bound_text(1.0 - one["probability_lower"], upper=True)
+            notes.append(
+                f"{name}: violated with a probability of {number_text(1.0 - one['probability'])} "
+                f"({low} .. {high}, each bound with the confidence required)"
+            )
+        elif not bad and used and np.isfinite(one["probability_lower"]):
+            most = bound_text(1.0 - one["probability_lower"], 3, upper=True)
+            never.setdefault((most, f"{one['confidence_required']:g}"), []).append(str(name))
+        if verdict != alone:
+            notes.append(
+                f"{name}: without the failed runs it would be {alone.words}; run them again "
+                "(ringsim campaign --retry-failed)"
+            )
+        if not one["samples_used"]:
+            notes.append(f"{name}: no sample has a valid result for it")
+        if short := one.get("samples_short"):
+            held = one["samples_used"] - one["samples_violating"]
+            hint = "" if OUTCOME in analysis["requirement"] else _HINT
+            notes.append(
+                f"{name}: {short} of the {held} samples that meet it ended before the antenna was "
+                f"deployed, and might have violated it later{hint}"
+            )
+        if missing := one["samples_without_value"]:
+            notes.append(
+                f"{name}: violations without a value (the antenna did not get that far): {missing}"
+            )
+    notes = [
+        f"no sample violates {', '.join(names)}: the probability of a violation is at most {most} "
+        f"(confidence {level})"
+        for (most, level), names in never.items()
+    ] + notes
+    if rows:
+        notes.insert(0, _CHOSEN if chosen else _DECIDES)
+    head = (
+        f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
+        "verdict", SHARE_MET, BOUND, "samples used", "violating", "failed runs",
+        "verdict without failed runs", "samples to go",
+    )  # fmt: skip
+    return marked(Table(head, rows, notes), analysis, head.index(SHARE_MET))
+
+
+SHARE_MET = "share that meets it"
+BOUND = "one-sided bound"
+_DECIDES = (
+    "the one-sided bound, at the confidence required, decides each verdict; where neither the "
+    "lower nor the upper bound decides, both are given"
+)
+
+
+_CHOSEN = "these samples stand for no population: there is no probability to estimate"
+
+
+def decisive(verdict: Verdict, low: float, high: float) -> str:
+    """The bound of a probability that decides a verdict; both where neither does."""
+    least, most = bound_text(low, upper=False), bound_text(high, upper=True)
+    if verdict is Verdict.MET:
+        return f"at least {least}"
+    if verdict is Verdict.NOT_MET:
+        return f"at most {most}"
+    return f"at least {least}, at most {most}" if np.isfinite([low, high]).all() else "-"
 
 
 # Whether the first samples of a campaign are enough, by its ``stop_when``.
@@ -340,10 +467,11 @@ def holds(
     for each in rule.conditions:
         if each.requirement is not None:
             wanted = {each.requirement: requirements[each.requirement]}
-            (code,) = judge(campaign, wanted, placed)["verdict"].to_numpy().tolist()
-            shown = code in (Verdict.MET, Verdict.NOT_MET)
+            found = judge(campaign, wanted, placed).isel(requirement=0)
+            one = {name: found[name].item() for name in _MEANING}
+            shown = one["verdict"] in (Verdict.MET, Verdict.NOT_MET)
             what = wanted[each.requirement].told(each.requirement)
-            told.append(f"{what} is {Verdict(code).words}")
+            told.append(f"{what} is {verdict_text(one)}")
         else:
             half = _half_width(each, campaign, placed)
             shown = half <= float(each.half_width or 0.0)

@@ -3,17 +3,16 @@
 import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.campaign_notes import LATE, doubted, marked
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
     LOST,
-    blocks_of,
     called,
     drawn,
     endings,
@@ -25,16 +24,14 @@ from ringsim.analysis.design import (
     planes_apart,
     short_of_goal,
 )
-from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.influence import separating, standing_out
-from ringsim.analysis.intervals import ROUND_OFF, Mask, good, lost, numbers, quantities, ran
+from ringsim.analysis.intervals import ROUND_OFF, Mask, good, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
-from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import exceeded
 from ringsim.overrides import flat
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table, chance_text, counted, number_text, readable, with_unit
+from ringsim.tables import Table, counted, number_text, readable, with_unit
 from ringsim.variables import about
 
 # What is unusual in the inputs of a sample, in words.
@@ -388,11 +385,13 @@ def note_on_unusual(analysis: xr.Dataset) -> str:
 def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
     """The same for terminals."""
     lines = list[str]()
-    for table in worst_tables(analysis, folder):
+    tables = [doubted(each, analysis.attrs) for each in worst_tables(analysis, folder)]
+    for table in tables:
         lines.append(f"worst of: {table.title}")
         for sample, value, odd, again in table.rows:
             lines += [f"  sample {sample}: {value}", f"    inputs: {odd}", f"    {again}"]
-    return [*lines, *filter(None, [note_on_unusual(analysis)])] if lines else []
+    notes = dict.fromkeys([note_on_unusual(analysis), *(n for each in tables for n in each.notes)])
+    return [*lines, *filter(None, notes)] if lines else []
 
 
 # How far the worst samples stay from the limits of the scene, and from the drive that they need.
@@ -488,72 +487,6 @@ def margin_table(analysis: xr.Dataset) -> Table:
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"
     ] * any(name != _DRIVE for _, name, *_ in rows)
+    notes += filter(None, [analysis.attrs.get(LATE)])
     head = ("limit", "of", "worst value", "margin", "in sample")
     return marked(Table(head, rows, notes, left=2), analysis, 2)
-
-
-# Lost runs that bend what the others tell: which lines they bend, and the mark on these.
-#
-# Runs that are lost where inputs have certain values leave another population behind: its mean,
-# quantiles and shares are not those of the antenna, and their intervals tell nothing of that.
-
-
-MARK = " *"
-"""Stands behind what lost runs bend."""
-_OF_LOSSES = "failed"
-"""How names of groups and outcomes begin that are those of lost runs: all that ran tell them."""
-NOTE = "lost_runs"
-"""Attribute that says why, of an analysis and of each of its variables that is bent."""
-
-
-@dataclass(frozen=True)
-class Losses:
-    """The lost runs of a campaign, and whether they go with inputs."""
-
-    count: int
-    ran: int
-    chance: float
-    """Probability that runs lost at random go with inputs as much; NaN if none is lost."""
-
-    @property
-    def note(self) -> str:
-        """Why statistics are bent, in words; empty if they are not, as far as one can tell."""
-        if not self.chance < UNLIKELY:
-            return ""
-        return (
-            f"{self.count} of {self.ran} runs failed, and whether one fails depends on the "
-            f"inputs ({chance_text(self.chance)}): numbers marked{MARK} are from the other "
-            f"{self.ran - self.count} alone, which are not representative, and may be far off "
-            "(run the failed ones again: ringsim campaign --retry-failed, or narrow the inputs)"
-        )
-
-    @property
-    def mark(self) -> str:
-        """What stands behind a line that they bend; empty if they do not."""
-        return MARK if self.note else ""
-
-
-def losses(campaign: xr.Dataset) -> Losses:
-    """The lost runs of a merged campaign; subset simulation takes them as no event, and says so."""
-    run, gone = ran(campaign), lost(campaign)
-    count, chance = int(gone.sum()), np.nan
-    if count and subset_simulation(campaign.attrs) is None:
-        blocks, block = blocks_of(campaign), None
-        if blocks is not None:
-            block = np.unique(np.arange(len(run))[run] // blocks.size, return_inverse=True)[1]
-        chance = dependence(gone[run], drawn(campaign).values[run], block)
-    return Losses(count, int(run.sum()), chance)
-
-
-def marked(table: Table, analysis: xr.Dataset, column: int = 0) -> Table:
-    """A table with the mark in one column of each row, but of those about lost runs, if an analysis
-    says that its statistics are bent.
-    """
-    if not analysis.attrs.get(NOTE):
-        return table
-    rows, own = [], False
-    for row in table.rows:
-        own = row[0].startswith(_OF_LOSSES) if row[0] else own  # a blank repeats the one above
-        mark = "" if own else MARK
-        rows.append((*row[:column], f"{row[column]}{mark}", *row[column + 1 :]))
-    return table._replace(rows=rows)

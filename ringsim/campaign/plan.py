@@ -40,6 +40,8 @@ Samples = NDArray[np.int64]
 _MOST_SHOWN = 10
 _SHORT = 20.0
 """A trial run that takes longer hardly consists of loading code, s."""
+_FULL = 30.0
+"""Time of the full engine over that of frames: 20 to 50 (docs/evidence/frame.md)."""
 _STRONG = 0.5
 """Rank correlation of two inputs that is told before anything runs."""
 
@@ -48,8 +50,9 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     """The plan as text; InputError if the folder, which need not exist, is another campaign's.
 
     The cost is predicted from samples that are done; if there are none, one sample of middling
-    cost runs as a trial, and nothing of it is kept.  So is that of checks by the judging engine.
-    ``say`` is told before a trial begins, which may take minutes.
+    cost runs as a trial, and nothing of it is kept.  So is that of checks by the judging engine,
+    but from the samples' own cost where a trial would take long.  ``say`` is told before a trial
+    begins, which may take minutes.
     """
     order.check()
     campaign, share = grown(order.campaign, order.folder), order.share
@@ -117,7 +120,9 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
             f"  checks         {counted(len(checked), 'sample')} with the full engine, too, "
             f"{len(open_)} to run"
         )
-        own, told, _ = _predicted(order, table, judged, open_, check_of, runs, say)
+        known = each if len(each) else found.seconds[np.isfinite(found.seconds)]
+        like = float(known.mean()) if len(known) else 0.0
+        own, told, _ = _predicted(order, table, judged, open_, check_of, runs, say, like)
         lines += [f"  cost of checks {words}" for words in told]
         each = np.concatenate([each, own])
     if not len(each):
@@ -136,9 +141,11 @@ def _predicted(
     number: Callable[[int], int],
     runs: int,
     say: Callable[[str], None],
+    like: float = 0.0,
 ) -> tuple[Array, list[str], float]:
     """Time of each run (s), that in words, and bytes that a run takes in the journals; ``number``
-    is that of a sample's run, ``runs`` are those that the journals hold.
+    is that of a sample's run, ``runs`` are those that the journals hold.  Of checks ``like`` is the
+    time of a sample (s).
     """
     if not len(todo):
         return np.empty(0), [], 0.0
@@ -149,6 +156,9 @@ def _predicted(
         basis = f"from {counted(len(known), 'completed sample')}"
         written = (file.stat().st_size for file in (order.folder / "journals").iterdir())
         size = sum(written) / runs
+    elif like * _FULL > _SHORT:
+        per_cost, size = like * _FULL / float(cost[todo].mean()), 0.0
+        basis = f"estimated as {_FULL:g} times a sample's: a trial would take as long"
     else:
         trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
         kept: list[Result] = []

@@ -63,7 +63,7 @@ class Asynchrony(Output):
         ),
         Variable(
             "asynchrony_max", (), "degree",
-            "largest asynchrony up to the deployment time, or the run's end without one",
+            "largest asynchrony up to the deployment time, or to the end of a run without one",
             error_bar=ErrorBar("largest asynchrony", safety=1.8),
             summary=("largest asynchrony", "10.4f"), worse="larger", largest_of="asynchrony",
             round_off=1e-4,  # sections that are all alike run apart by up to 5e-6 deg

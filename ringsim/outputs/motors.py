@@ -206,20 +206,23 @@ class DriveMargins(Output):
             "the angles that the plane passed until it had locked",
         ),
         Variable(
-            "least_plane_margin", (), "1", "least_drive_margin_plane of the plane with less",
+            "least_plane_margin", (), "1",
+            "smallest static margin of either plane's own cable, against half of all that resists",
             worse="smaller", least_of="least_drive_margin_plane",
         ),
     )  # fmt: skip
 
     def told(self, values: Values, span_names: SpanNames) -> str:
         """As "at 20.5 deg and 0.1 s: NOT enough"; of a plane whose own cable falls short by more
-        than the mean of both, "at 20.5 deg and 0.1 s: enough, but one plane has -1.000".
+        than the mean of both, "at 20.5 deg and 0.1 s: enough, but one plane has -1.000", or "NOT
+        enough, and one plane even -0.951".
         """
         names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
         word = "enough" if margin >= 0.0 else "NOT enough"
         plane = float(values.get("least_plane_margin", math.nan))
-        own = f", but one plane has {plane:.3f}" if plane < min(margin, 0.0) - 5e-4 else ""
+        also = ", but one plane has" if margin >= 0.0 else ", and one plane even"
+        own = f"{also} {plane:.3f}" if plane < min(margin, 0.0) - 5e-4 else ""
         return f"at {angle:.4g} deg and {time:.4g} s: {word}{own}"
 
     def reduce(self, run: Run, series: Series) -> Values:

@@ -196,7 +196,7 @@ def overloads(
 
 
 def below_limits(scene: Scene, values: Values) -> Iterator[str]:
-    """How far each load stayed below the limit of the scene, in a sentence; nothing of others."""
+    """The margin of each load that stayed below the limit of the scene; nothing of others."""
     for output in OUTPUTS:
         most = getattr(scene.limits, output.limit) if output.limit else None
         series, *others = output.variables
@@ -205,9 +205,9 @@ def below_limits(scene: Scene, values: Values) -> Iterator[str]:
         (peak,) = (one for one in others if one.largest_of == series.name)
         # A peak may count up to the last lock, a limit holds for the whole run.
         largest = max(float(values[peak.name]), float(np.nanmax(values[series.name])))
-        if largest <= most and peak.summary is not None:
+        if 0.0 < largest <= most and peak.summary is not None:
             yield (
-                f"{peak.summary[0]} stays {100.0 * (1.0 - largest / most):.0f} % below "
+                f"{peak.summary[0]}: margin {most / largest - 1.0:+.3g} (limit / value - 1) to "
                 f"limits.{output.limit} = {with_unit(f'{most:g}', peak.units)}"
             )
 

@@ -25,7 +25,7 @@ from ringsim.analysis.design import (
     inputs,
     paths_of,
 )
-from ringsim.analysis.intervals import good
+from ringsim.analysis.intervals import good, lost, ran
 from ringsim.analysis.residuals import residual_table, residuals
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import Section, head_lines, outputs_in, sections
@@ -100,15 +100,16 @@ def failures(
 
 
 def drawn_inputs(campaign: xr.Dataset) -> Rows:
-    """Name, unit, places, distribution, the values that came out, and the scene's paths that take
-    them: a row an input.
+    """Name, unit, places, distribution, the values that samples which have run have of it, and the
+    scene's paths that take them: a row an input.
     """
-    rows = []
+    rows, held = [], ran(campaign)
     for name in inputs(campaign):
         variable = campaign[name]
         if variable.attrs.get("path") == "solver.error_bars":  # drawn by nobody
             continue
         law, values = law_text(distribution_of(variable)), variable.to_numpy()
+        values = values[held] if held.any() else values
         if values.dtype.kind in "OU":
             counts = Counter(values.ravel().astype(str).tolist()).most_common(6)
             extent = ", ".join(f"{word} ({n})" for word, n in counts)
@@ -263,7 +264,7 @@ def page(
         "title": campaign.attrs.get("title", "Campaign"),
         "name": campaign.attrs.get("campaign_name", ""), "question": wanted.get("question", ""),
         "samples": campaign.sizes["sample"], "used": int(good(campaign).sum()),
-        "not_run": int((endings(campaign) == "not run").sum()),
+        "failed": int(lost(campaign).sum()), "not_run": int((~ran(campaign)).sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
         "scene_title": _title_of_scene(campaign),

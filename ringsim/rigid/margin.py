@@ -182,19 +182,23 @@ def place_of_winch(scene: Scene, cable: int, end: int) -> str:
     return f"cables.{scene.structure.planes[plane]}.{('winch', 'far_winch')[end]}"
 
 
-def _still_off(scene: Scene, drive: DriveMargin, time: float, last: float) -> str:
-    """What a reason says of winches that start after the time (s) of the least margin, and of a
-    ring that goes on until the ``last`` time (s) after all of them have been switched off.
+def _still_off(scene: Scene, drive: DriveMargin, time: float, way: "Passed") -> str:
+    """What a reason says of winches that start after the time (s) of the least margin, with the
+    least from then on, and of a ring that goes on after all of them have been switched off.
     """
-    late = [
-        f"{place_of_winch(scene, *where)} starts at {winch.start_time:g} s"
+    late = {
+        f"{place_of_winch(scene, *where)} starts at {winch.start_time:g} s": winch.start_time
         for where, winch in drive.conditions.winches.items()
         if turns_ever(winch) and time < winch.start_time - AT_ONCE
-    ]
-    told = f"; the least drive margin is that of {time:.4g} s, before {' and '.join(late)}"
-    end = drive.conditions.end
+    }
+    told, last, end = "", float(way.times[-1]), drive.conditions.end
+    if late:
+        told = f"; the least drive margin is that of {time:.4g} s, before {' and '.join(late)}"
+        if (started := max(late.values())) < min(last, end):
+            then = least_along(drive, way.between(started, math.inf))
+            told += f": from then on {then.margin:.3f} at {math.degrees(then.angle):.4g} deg"
     over = f"; the least drive margin ends at {end:.4g} s, when the last winch is switched off"
-    return told * bool(late) + over * (last > end + AT_ONCE)
+    return told + over * (last > end + AT_ONCE)
 
 
 def _margin(drive: float, required: float) -> float:
@@ -314,7 +318,7 @@ def with_margin(
     reason = outcome.reason
     if leasts:
         least = min(leasts)
-        reason += _still_off(scene, last, least.time, float(way.times[-1]))
+        reason += _still_off(scene, last, least.time, way)
         values |= {
             "least_drive_margin": np.asarray(least.margin),
             "least_drive_margin_time": np.asarray(least.time),

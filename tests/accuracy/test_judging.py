@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import tomli_w
 import xarray as xr
 from loops import for_each
 
-from ringsim.analysis.accuracy import NEEDED, Truth, in_words, judge, lines, tables
+from ringsim.analysis.accuracy import NEEDED, Truth, bounds, in_words, judge, lines, tables
 from ringsim.analysis.ladder import PATHS, Rung, by_frames, ladder, references
 from ringsim.analysis.study import evidence_for, evidence_of, read_evidence
 from ringsim.refusal import InputError
@@ -132,6 +133,19 @@ def test_an_error_that_is_small_by_chance_recommends_nothing() -> None:
     assert float(found.error[lucky]) < 1e-6
     finer = next(k for k, rung in enumerate(RUNGS) if rung.label == "x 1")
     assert float(found.bound[lucky]) >= float(found.error[finer])
+
+
+def test_what_changes_nothing_makes_no_setting_better() -> None:
+    """Two settings with the same results, of which one solves each step more exactly: what a third
+    one that is finer than the first alone tells holds for both, so that the scene's own is kept.
+    """
+    standing = next(r for r in RUNGS if r.ladder == "as it stands")
+    exact = standing.values | {"solver.newton_tolerance": 1e-9}
+    finer = standing.values | {"rods.elements": 2 * standing.values["rods.elements"]}
+    rungs = [standing, *(replace(standing, values=each) for each in (exact, finer))]
+    assert bounds(np.array([[1e-4], [1e-4], [2e-3]]), rungs, np.zeros(1)).tolist() == [[2e-3]] * 3
+    found = bounds(np.array([[1e-4], [1.1e-4], [2e-3]]), rungs, np.zeros(1))
+    assert found.ravel().tolist() == [2e-3, 1.1e-4, 2e-3]
 
 
 def test_the_motion_leaves_asynchrony_to_itself(study: xr.Dataset) -> None:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+import scipy
+import xarray as xr
 from made_campaign import made_campaign
 
-from ringsim.analysis.campaign_notes import peak_lines, remark_lines
+from ringsim.analysis.campaign_notes import late_line, peak_lines, remark_lines
 from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import not_met
 from ringsim.analysis.study_text import told as all_told
+from ringsim.analysis.verdicts import verdict_table
+from ringsim.analysis.worst import margin_table
 
 pytestmark = pytest.mark.quick
 
@@ -55,3 +62,81 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     assert remark_lines(made_campaign(3)) == []
     made["reason"] = "sample", np.array([f"{reached}; {latch}"] * 12, dtype=object)
     assert remark_lines(made) == [f"in all 11 samples, for example in sample 0: {latch}"]
+
+
+REACHED = "all V-joints have reached 180 deg"
+LONG = "steps of {} ms at the lock at 9 s are too long for shocks in the rods (period 1 ms)"
+
+
+def with_doubts(made: xr.Dataset, names: dict[int, str]) -> xr.Dataset:
+    """By sample the outputs that its run calls uncertain; the finest cure is that of the last."""
+    reasons = np.full(made.sizes["sample"], REACHED, dtype=object)
+    for k, of in names.items():
+        cure = f"set solver.tolerance = {1e-4 / (k + 1):.1e} (2 to 3 times the steps)"
+        reasons[k] += f"; {LONG.format(k)}, so {of} may be off: {cure}"
+    return made.assign(reason=("sample", reasons))
+
+
+def test_what_runs_call_uncertain_is_marked_wherever_it_is_told() -> None:
+    """With one line that counts the samples of each output and has what cures all of them."""
+    lists = {0: "peak_tension, asynchrony_max", 2: "peak_tension", 3: "peak_tension", 5: "nothing"}
+    where = {"time": [5.0] * 9, "plane": ["upper"] * 9, "span": [1] * 9}
+    made = with_doubts(made_campaign(9, failed=(3,)), lists)
+    made = made.assign({f"peak_tension_{k}": ("sample", v) for k, v in where.items()})
+    found = analyse(made)
+    text = "\n".join(all_told(found))
+    line = (
+        "? may be off, since steps are too long for the shocks of locks: peak_tension in 2 of 8 "
+        "samples, asynchrony_max in 1, nothing in 1; set solver.tolerance = 1.7e-05 (2 to 3 times "
+        "the steps)"
+    )
+    assert text.count(line) == 1
+    assert line in peak_lines(made)
+    assert not remark_lines(made)
+    for name in ("peak_tension", "asynchrony_max"):
+        marked = re.findall(rf"\b{name}\b(?! in [12])(.?.?)", text.replace(line, ""))
+        assert set(marked) == {" ?"}
+        assert len(marked) >= 2
+    assert "deployment_time ?" not in text
+    assert "largest tension ? in sample 8" in "\n".join(peak_lines(made))
+    assert found["peak_tension"].attrs["may_be_off"] == "2 of 8 samples"
+    assert "may_be_off" not in analyse(made_campaign(9)).attrs
+
+
+def test_a_verdict_says_so_if_what_may_be_off_could_change_it() -> None:
+    """Met by all of 30 samples, or by none: it stands as long as Clopper and Pearson's bound with
+    those samples on the other side decides it, too.
+    """
+    made, seen = made_campaign(30), set()
+    for most, sound in ((100.0, "met"), (10.0, "not met")):
+        wanted = {"peak_tension": {"max": most, "probability": 0.8, "confidence": 0.9}}
+        for count in range(0, 31, 3):
+            doubtful = with_doubts(made, dict.fromkeys(range(count), "peak_tension"))
+            found = analyse(doubtful, wanted)
+            (row,) = verdict_table(found).rows
+            kept = 30 - count if most > 50.0 else count
+            low = scipy.stats.beta.ppf(0.1, kept, 31 - kept) if kept else 0.0
+            high = scipy.stats.beta.ppf(0.9, kept + 1, 30 - kept) if kept < 30 else 1.0
+            stands = low >= 0.8 if most > 50.0 else high < 0.8
+            told = f"{sound}, if its numbers hold: may be off in {count} of 30 samples"
+            assert row[3] == (sound if stands else told)
+            gate = not_met(found)
+            assert gate == ([] if stands and most > 50.0 else [f"{row[0]} is {row[3]}"])
+            seen.add((most, stands))
+    assert len(seen) == 4
+
+
+def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> None:
+    """With the worst sample from then on."""
+    made = made_campaign(4)
+    words = "the least drive margin is that of 0 s, before cables.lower.winch starts at {} s"
+    reasons = [REACHED, *(f"{REACHED}; {words.format(k)}: from then on {m:.3f} at 14 deg"
+                          for k, m in ((1, 0.3), (2, -0.2), (3, 0.1)))]  # fmt: skip
+    made["reason"] = "sample", np.array(reasons, dtype=object)
+    made["least_drive_margin"] = "sample", np.array([0.1, -0.5, -0.6, -0.7])
+    line = f"in 3 of 4 samples, the worst of them sample 2: {words.format(2)}: from then on -0.200"
+    assert line in "\n".join(margin_table(analyse(made)).notes)
+    assert late_line(made).startswith(line)
+    assert not remark_lines(made)
+    made["reason"] = "sample", np.array([REACHED] * 4, dtype=object)
+    assert late_line(made) == ""

@@ -14,6 +14,7 @@ import xarray as xr
 from made_campaign import made_campaign
 
 from made import drawn_campaign
+from ringsim.analysis.campaign_notes import MARK, NOTE, losses
 from ringsim.analysis.comparison import compare
 from ringsim.analysis.comparison_text import compared
 from ringsim.analysis.design import placement
@@ -21,7 +22,6 @@ from ringsim.analysis.requirements import read_requirements, to_json
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import error_lines, told, verdict_lines
 from ringsim.analysis.verdicts import Verdict, judge
-from ringsim.analysis.worst import MARK, NOTE, losses
 from ringsim.plots.campaign.numbers import distributions
 from ringsim.report import page as of_pages
 from ringsim.sampling.designs.blocks import Saltelli

@@ -202,6 +202,18 @@ def test_a_dry_run_tells_what_checks_cost(checked):
     assert not (checked.folder / "new").exists()
 
 
+def test_of_a_check_that_takes_long_the_cost_is_estimated_and_none_is_run(tmp_path):
+    """Samples of about 0.8 s, so that a check would take 24 s; this judge would kill itself."""
+    bench = Bench(tmp_path, {"JUDGE_DIES": "1"})
+    path = written(bench)
+    path.write_text(path.read_text().replace("[set]", '[set]\n"rods.damping" = 0.9'))
+    printed = bench.run(*CALL, "--dry-run", solver="fake_solver:slow")
+    (cost,) = (line for line in printed.splitlines() if "cost of checks" in line)
+    assert "estimated as 30 times a sample's" in cost
+    assert 20.0 <= float(cost.split()[3]) < 60.0
+    assert "trial run of the check" not in printed
+
+
 def test_replay_repeats_the_check_too(checked):
     printed = checked.run("replay", "out", 2, "--check", "--save", "full.nc")
     assert "check of sample 2: ok" in printed

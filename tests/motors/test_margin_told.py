@@ -102,6 +102,9 @@ def test_a_run_says_that_its_least_margin_waits_for_a_winch(scene: Scene) -> Non
     run = simulate(scene.with_values({"cables.lower.winch.start_time": 0.25}), fidelity="frame")
     words = "the least drive margin is that of 0 s, before cables.lower.winch starts at 0.25 s"
     assert words in run.attrs["reason"]
+    (then,) = re.findall(r"0.25 s: from then on (\S+) at", run.attrs["reason"])
+    later = float(run.drive_margin.where(run.time >= 0.25).min())
+    assert float(then) == pytest.approx(later, abs=2e-3)
     assert float(run.least_drive_margin_time) == 0.0
     assert "least drive margin" not in simulate(scene, fidelity="frame").attrs["reason"]
 

@@ -156,7 +156,8 @@ def test_the_least_margin_is_told_with_its_angle_and_verdict(margin: float, word
     least = {"least_drive_margin": margin, "least_drive_margin_angle": 21.25}
     told = DriveMargins().told(least | {"least_drive_margin_time": 0.5}, {})
     assert told == f"at 21.25 deg and 0.5 s: {word}"
-    for plane, more in ((-1.0, ", but one plane has -1.000"), (margin, ""), (0.3, "")):
+    less = ", and one plane even -1.000" if margin < 0.0 else ", but one plane has -1.000"
+    for plane, more in ((-1.0, less), (margin, ""), (0.3, "")):
         both = least | {"least_drive_margin_time": 0.5, "least_plane_margin": plane}
         assert DriveMargins().told(both, {}) == told + more
 

@@ -49,8 +49,8 @@ def test_loads_are_told_by_how_far_they_stay_below_their_limits() -> None:
     }  # fmt: skip
     # Behind the last lock a tension counts as well.
     assert sorted(below_limits(scene, values)) == [
-        "largest rod stress stays 10 % below limits.rod_stress = 30 MPa",
-        "largest tension stays 25 % below limits.tension = 40 N",
+        "largest rod stress: margin +0.111 (limit / value - 1) to limits.rod_stress = 30 MPa",
+        "largest tension: margin +0.333 (limit / value - 1) to limits.tension = 40 N",
     ]
     assert not list(below_limits(load_scene("ring18-cable"), values))
     values["peak_tension"] = np.array(41.0)  # its outcome is "overloaded", and says so

@@ -256,6 +256,27 @@ def test_the_page_begins_with_the_question() -> None:
     assert 'id="question"' not in page(campaign, "here")
 
 
+@pytest.mark.usefixtures("_undrawn")
+def test_the_page_counts_what_failed_and_what_has_not_run() -> None:
+    """Nothing is said to be listed that is not there; inputs are of the samples that have run."""
+    for lost, left, words in (
+        ((), (6, 7), "6 of 8</b> samples are in the statistics: 2 have not run yet; none that ran "
+         "has failed."),
+        ((), (7,), "7 of 8</b> samples are in the statistics: 1 has not run yet; none that"),
+        ((1, 2), (7,), "5 of 8</b> samples are in the statistics: 2 failed, as listed below, and 1 "
+         "has not run yet."),
+        ((1,), (), "7 of 8</b> samples are in the statistics: 1 failed, as listed below."),
+        ((), (), "All samples have valid results"),
+    ):  # fmt: skip
+        campaign = made_campaign(8, failed=lost, not_run=left)
+        drawn = {"role": "input", "path": "net.stiffness", "units": "N m-1", "distribution": "{}"}
+        campaign["net.stiffness"] = "sample", np.arange(8.0), drawn
+        text = " ".join(page(campaign, "here").split())
+        assert words in text
+        assert (f"what the {8 - len(left)} samples have that have run" in text) == bool(left)
+        assert f"<td>0 to {7 - len(left)}</td>" in text
+
+
 def test_the_player_holds_what_was_computed(made: tuple[str, xr.Dataset, str]) -> None:
     _, campaign, text = made
     held = re.search(r'id="player-data">(.*?)</script>', text, re.DOTALL)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import runpy
 from pathlib import Path
 
@@ -214,3 +215,11 @@ def test_the_benchmarks_map_is_large_and_its_cells_are_valid() -> None:
     for panel in (*panels, *quick):
         for x, y in itertools.product(panel.x.values[:: len(panel.x.values) - 1], panel.y.values):
             panel.scene.with_values(panel.x.at(x) | panel.y.at(y))
+
+
+def test_reasons_are_told_by_whole_clauses() -> None:
+    """As many as there is room for, never half of one, as of a cure that would be cut off."""
+    words, found = "steps are too long: set solver.tolerance = 1e-4", cells(GOOD, NEWTON)
+    found["reason"].values[1] = "; ".join([NEWTON, *[words] * 20])
+    told = to_markdown(joined([(WORDS, found)]))
+    assert re.search(rf"\| {NEWTON}(; {words}){{2,6}} \|\n", told)

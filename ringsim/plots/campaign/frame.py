@@ -3,7 +3,7 @@
 import itertools
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ringsim.analysis.campaign_notes import (
+    DOUBT,
+    MARK,
+    NOTE,
+    attributes,
+    doubted,
+    off_counts,
+    off_note,
+)
 from ringsim.analysis.courses import QUANTILES, ends
 from ringsim.analysis.design import (
     called,
@@ -34,9 +43,10 @@ from ringsim.analysis.intervals import (
     varies,
 )
 from ringsim.analysis.requirements import required_by
-from ringsim.analysis.worst import losses, one_at_a_time
+from ringsim.analysis.worst import one_at_a_time
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
+from ringsim.tables import Table
 
 LOOKS = {
     "deployed": (style.BLUE, "o"),
@@ -68,9 +78,13 @@ _LINE = 0.16
 def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> None:
     """Subject and campaign above the sheet, the number of samples and their fate below it."""
     inches = figure.get_size_inches()[0]
-    if (lost := losses(campaign)).note:
-        subject += lost.mark
-        caption += f"\n{lost.mark.strip()} {lost.note[0].upper()}{lost.note[1:]}."
+    says = attributes(campaign)
+    if note := says[NOTE]:
+        subject += MARK
+        caption += f"\n{MARK.strip()} {note[0].upper()}{note[1:]}."
+    (marked, *_) = doubted(Table((), (), [caption]), says).notes
+    if _mark_panels(figure, off_counts(says)) or marked != caption:
+        caption = f"{marked}\n{off_note(says)}."
     held = caption.replace(" %", f"{style.FIXED}%")
     words = "\n".join(textwrap.fill(each, int(12.0 * inches)) for each in held.split("\n"))
     words = words.replace(style.FIXED, " ")
@@ -84,6 +98,19 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
         legend.get_title().set_color(style.GREY)
     else:
         figure.supxlabel(words, x=0.012, ha="left", fontsize=9, color=style.GREY)
+
+
+def _mark_panels(figure: Figure, names: Collection[str]) -> bool:
+    """Mark panels and axes that are of outputs which may be off; whether there are any."""
+    both = [(VARIABLES[n], VARIABLES.get(VARIABLES[n].largest_of or VARIABLES[n].least_of))
+            for n in names]  # fmt: skip
+    words = [each.long_name.lower() for pair in both for each in pair if each is not None]
+    texts = [t for a in figure.axes for t in (a.title, a.xaxis.label, a.yaxis.label)]
+    texts += [figure._supylabel] if figure._supylabel else []  # type: ignore[attr-defined]
+    found = [t for t in texts if any(w in " ".join(t.get_text().lower().split()) for w in words)]
+    for text in found:
+        text.set_text(f"{text.get_text()}{DOUBT}")
+    return bool(found)
 
 
 def standing(campaign: xr.Dataset) -> tuple[xr.Dataset, str]:
