@@ -215,7 +215,7 @@ def explained(campaign: xr.Dataset) -> bool:
 
 
 @picture(
-    "campaign", 90, "Which inputs matter for each main number, with intervals", applies=explained
+    "campaign", 90, "Which inputs matter for each main number", applies=explained
 )
 def tornado(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a bar an input or group; whiskers are 95 % intervals."""
