@@ -1,6 +1,7 @@
 """What the base carries, and how it turns."""
 
 import math
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -147,6 +148,16 @@ def unresolved(run: Run, shocks: Mapping[str, float]) -> str:
         f"shocks in the rods (period {1e3 * period:.3g} ms), so {names} may be off: "
         f"{_to(run, enough / longest_step)}"
     )
+
+
+def doubted(reason: str) -> list[str]:
+    """The numbers of which ``unresolved`` has said in a reason that they may be off.
+
+    >>> doubted("deployed; steps of 9 ms are too long, so peak_a, peak_b may be off: set")
+    ['peak_a', 'peak_b']
+    """
+    return [name for told in re.findall(r", so ([^:;]+) may be off", reason)
+            for name in told.split(", ")]  # fmt: skip
 
 
 _DOUBTFUL = 2.5
