@@ -243,13 +243,14 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
     ``NAME_rank_correlation`` of both (NaN of few pairs, and where either side hardly differs
     between samples) and ``NAME_spread`` (side), and ``NAME_doubtful`` (side), in how many samples
     the runs themselves say that it may be off, if any does; an output that only one of them has is
-    missing in the other, and in the difference.  The pairs whose outcome differs along ``change``; shares of outcomes along ``kind`` and of samples that meet a
-    requirement along ``requirement``, see ``differences_of_shares``, and the verdicts on those
-    whose limits differ as lines in the attribute ``moved``; the margins to equal limits of
-    both along ``limit``; the scenes' values that differ along ``setting``, by path.  Samples are
-    those of ``samples_of``, as far as ``analyse`` counts them; means and shares are those of populations, and of pairs of grids
-    and lists.  ``pairing`` among the attributes says what is paired; ``names`` are what tables and
-    figures call the two.  InputError if one holds a run and the other a campaign.
+    missing in the other, and in the difference. The pairs whose outcome differs along ``change``;
+    shares of outcomes along ``kind`` and of samples that meet a requirement along ``requirement``,
+    see ``differences_of_shares``, and the verdicts on those whose limits differ as lines in the
+    attribute ``moved``; the margins to equal limits of both along ``limit``; the scenes' values
+    that differ along ``setting``, by path.  Samples are those of ``samples_of``, as far as
+    ``analyse`` counts them; means and shares are those of populations, and of pairs of grids and
+    lists. ``pairing`` among the attributes says what is paired; ``names`` are what tables and
+    figures call the two. InputError if one holds a run and the other a campaign.
     """
     if ("sample" in first.dims) != ("sample" in second.dims):
         raise InputError(

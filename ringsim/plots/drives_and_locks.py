@@ -204,7 +204,7 @@ def base(dataset: xr.Dataset) -> Figure:
         axes.margins(y=0.12)
         if values.name in _LOADS:
             # Of readings at output times; the shock of a lock lies between two of them.
-            size = np.sqrt((values**2).sum("axis", skipna=False))
+            size = (values**2).sum("axis", skipna=False) ** 0.5
             peak = peak_of(dataset.assign(size=size), "size", f"peak_{values.name}")
             axes.plot(*peak.within(size), color=style.GREY, linewidth=0.9, zorder=1.5,
                       label="magnitude")  # fmt: skip

@@ -529,6 +529,19 @@ def test_a_table_without_a_figure_of_its_own_goes_before_the_figures(
     assert '<p class="note">.</p>' not in text
 
 
+def test_printed_figures_fill_their_sheets() -> None:
+    """A4 has 7.17 x 10.59 inch within its margins; what does not fit a sheet goes on another."""
+    sizes = [(11.1, 10.2), (8.6, 6.2), (10.5, 8.9), (8.4, 5.6), (9.8, 5.7), (10.5, 19.0)]
+    made = shell.sheets([(size, name) for name, size in enumerate(sizes)])
+    assert sorted(name for _, own in made for name in own) == list(range(len(sizes)))
+    for scale, own in made:
+        heights = [min(scale, 7.17 / sizes[k][0]) * sizes[k][1] + 0.385 for k in own]
+        assert 0.57 <= scale <= 0.85
+        assert len(own) == 1 or sum(heights) < 10.59 - 0.4  # of a heading
+    assert [own for _, own in made] == [[0, 1], [2], [3, 4], [5]]
+    assert made[2][0] > 0.7  # two small ones are drawn larger
+
+
 def test_long_heads_may_be_broken_at_underscores() -> None:
     """Else tables of many outputs are wider than paper, and browsers print all pages smaller."""
     campaign = made_campaign(4)

@@ -71,9 +71,8 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     if begin > 0.0 or end < float(found["time"][-1]):
         figure = Figure(figsize=(wide, sum(heights) + _WHOLE + 2.4))
         places = figure.add_gridspec(rows + 1, columns, height_ratios=[_WHOLE, *heights])
-        grid = places[1:, :].subgridspec(rows, columns).subplots()
+        grid = places[1:, :].subgridspec(rows, columns).subplots(squeeze=False)
         _whole(figure.add_subplot(places[0, :]), found, (begin, end), limits)
-        grid = np.reshape(grid, (rows, columns))
     else:
         figure = Figure(figsize=(wide, sum(heights) + 2.0))
         grid = figure.subplots(rows, columns, squeeze=False)
@@ -144,7 +143,7 @@ def _eventful(found: xr.DataArray) -> tuple[float, float]:
     """Begin and end (s) of the time in which any V-joint of any sample deviates by more than a
     tenth of the largest; the whole time where that is more than half of it.
     """
-    time, size = found["time"].to_numpy(), np.abs(found).max(("quantile", "plane", "section"))
+    time, size = found["time"].to_numpy(), abs(found).max(("quantile", "plane", "section"))
     far = time[size.to_numpy() > _LITTLE * float(size.max())]
     if not len(far):
         return 0.0, float(time[-1])
