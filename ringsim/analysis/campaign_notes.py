@@ -177,7 +177,7 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 continue
             worst = sound.sel(sample=sample)
             values = {str(n): each.values for n, each in worst.items() if not each.dims}
-            if output().told(values, spans):
+            if output().told_of(variable.name, values, spans):
                 # Series tell which places are alike.
                 values = {str(n): each.values for n, each in worst.variables.items()}
                 number, *told = summary(values, spans)[variable.name].split()

@@ -1,6 +1,7 @@
 """What is other in one campaign than in another, or in one run: paired where samples are."""
 
 import tomllib
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ from ringsim.analysis.campaign_notes import NOTE, losses
 from ringsim.analysis.derived import known_from
 from ringsim.analysis.design import (
     LOST,
+    NOT_RUN,
     Placement,
     called,
     distribution_of,
@@ -44,6 +46,7 @@ from ringsim.analysis.requirements import (
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.analysis.worst import margins
+from ringsim.outputs.base import may_be_off
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
 from ringsim.sampling.distributions import law_text
@@ -239,16 +242,16 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
     ``NAME_difference_interval`` (bound), ``NAME_samples`` (side) in its unit, and for pairs
     ``NAME_largest_difference`` with ``NAME_largest_difference_sample`` and
     ``NAME_rank_correlation`` of both (NaN of few pairs, and where either side hardly differs
-    between samples) and ``NAME_spread`` (side); an output that only one of them has is missing in
-    the other, and in the
-    difference.  The pairs whose outcome
-    differs along ``change``; shares of outcomes along ``kind`` and of samples that meet a
-    requirement along ``requirement``, see ``differences_of_shares``, and the verdicts on those
-    whose limits differ as lines in the attribute ``moved``; the margins to equal limits of
-    both along ``limit``; the scenes' values that differ along ``setting``, by path.  Samples are
-    those that ``analyse`` counts; means and shares are those of populations, and of pairs of grids
-    and lists.  ``pairing`` among the attributes says what is paired; ``names`` are what tables and
-    figures call the two.  InputError if one holds a run and the other a campaign.
+    between samples) and ``NAME_spread`` (side), and ``NAME_doubtful`` (side), in how many samples
+    the runs themselves say that it may be off, if any does; an output that only one of them has is
+    missing in the other, and in the difference. The pairs whose outcome differs along ``change``;
+    shares of outcomes along ``kind`` and of samples that meet a requirement along ``requirement``,
+    see ``differences_of_shares``, and the verdicts on those whose limits differ as lines in the
+    attribute ``moved``; the margins to equal limits of both along ``limit``; the scenes' values
+    that differ along ``setting``, by path.  Samples are those of ``samples_of``, as far as
+    ``analyse`` counts them; means and shares are those of populations, and of pairs of grids and
+    lists. ``pairing`` among the attributes says what is paired; ``names`` are what tables and
+    figures call the two. InputError if one holds a run and the other a campaign.
     """
     if ("sample" in first.dims) != ("sample" in second.dims):
         raise InputError(
@@ -259,11 +262,13 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
         known_from(each.attrs)
     single = "sample" not in first.dims
     one, other = (_numbered(each) for each in (first, second))
-    placed = placement(one), placement(other)
+    placed, planned = (placement(one), placement(other)), (one, other)
     notes = {side: losses(each).note for side, each in zip(SIDES, (one, other), strict=True)}
-    one, other = population_of(one), population_of(other)
+    ran = [int((endings(each) != NOT_RUN).sum()) for each in map(population_of, planned)]
     first_alone = np.zeros(1, dtype=np.int64)
-    pairs = Pairs(first_alone, first_alone, "two runs") if single else paired(one, other)
+    pairs = Pairs(first_alone, first_alone, "two runs")
+    if not single:
+        (one, other), pairs = samples_of(one, other)
     found = xr.Dataset(
         coords={"side": list(SIDES), "bound": ["lower", "upper"]},
         attrs={
@@ -271,6 +276,9 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             "first_name": names[0], "second_name": names[1],
             "pairing": pairs.told, "pairs": len(pairs.first), "runs": int(single),
             "first_samples": one.sizes["sample"], "second_samples": other.sizes["sample"],
+            "first_ran": ran[0], "second_ran": ran[1],
+            "first_planned": population_of(planned[0]).sizes["sample"],
+            "second_planned": population_of(planned[1]).sizes["sample"],
             "intervals": next(
                 (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
             ),
@@ -282,8 +290,25 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
     shares = differences_of_shares((one, other), placed, (pairs.first, pairs.second))
-    more = _changed((one, other), pairs) | settings((one, other)) | _limits((first, second))
+    more = _changed((one, other), pairs) | settings((one, other)) | _doubtful((one, other))
+    more |= _limits((first, second) if single else (one, other))
     return found.assign(more).assign(shares)
+
+
+def _doubtful(both: Both) -> dict[str, Any]:
+    """Of each output of which a run says that it may be off, in how many samples of both."""
+    counts = [
+        Counter(
+            name for reason in np.atleast_1d(each.get("reason", each.attrs.get("reason", "")))
+            for name in may_be_off(str(reason))[0]
+        )
+        for each in both
+    ]  # fmt: skip
+    words = about("samples whose run says that it may be off")
+    return {
+        f"{name}_doubtful": ("side", np.array([each[name] for each in counts]), words)
+        for name in dict.fromkeys([*counts[0], *counts[1]])
+    }
 
 
 def _limits(both: Both) -> dict[str, Any]:
@@ -363,6 +388,23 @@ def _numbered(dataset: xr.Dataset) -> xr.Dataset:
         return dataset
     scalars = dataset[[name for name, v in dataset.variables.items() if not v.dims]]
     return scalars.expand_dims(sample=[0])
+
+
+def samples_of(first: xr.Dataset, second: xr.Dataset) -> tuple[Both, Pairs]:
+    """The samples of two campaigns that are compared, and how: those of pairs where there are any,
+    else all; of either those that have run and stand for the population.
+    """
+    ran = [
+        each.isel(sample=np.flatnonzero(endings(each) != NOT_RUN))
+        for each in (population_of(first), population_of(second))
+    ]
+    pairs = paired(ran[0], ran[1])
+    if not len(pairs.first):
+        return (ran[0], ran[1]), pairs
+    order = np.sort(pairs.second)
+    both = ran[0].isel(sample=pairs.first), ran[1].isel(sample=order)
+    places = np.arange(len(order)), np.searchsorted(order, pairs.second)
+    return both, Pairs(*places, pairs.told)
 
 
 def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:

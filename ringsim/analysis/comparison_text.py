@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import NOTE, marked
+from ringsim.analysis.campaign_notes import DOUBT, NOTE, marked
 from ringsim.analysis.indices import largest_by_chance
 from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section
@@ -54,8 +54,11 @@ def head_lines(found: xr.Dataset) -> list[str]:
     """Which two, how their samples are paired, lost runs that bend it, and missing intervals."""
     pairs = ""
     if (count := found.attrs["pairs"]) and not found.attrs["runs"]:
-        sizes = found.attrs["first_samples"], found.attrs["second_samples"]
-        rest = "" if set(sizes) == {count} else f" of {sizes[0]} and {sizes[1]} samples"
+        sizes = found.attrs["first_ran"], found.attrs["second_ran"]
+        rest = "" if set(sizes) == {count} else (
+            f" of {sizes[0]} and {sizes[1]} samples that have run: "
+            "all tables and figures are of these pairs"
+        )  # fmt: skip
         pairs = f" ({counted(count, 'pair')}{rest})"
     lines = list[str]()
     for side, name in zip(("first", "second"), names_of(found), strict=True):
@@ -65,8 +68,63 @@ def head_lines(found: xr.Dataset) -> list[str]:
             told = f" ({own})" if title and name != side and own != title else ""
             lines.append(f"{side}: {title or found.attrs[f'{side}_name']}{told}")
     lines.append(f"{found.attrs['pairing']}{pairs}")
-    lines += [*filter(None, [found.attrs[NOTE], found.attrs["intervals"]]), *_cut_off(found)]
+    lines += [*_not_run(found), *filter(None, [found.attrs[NOTE], found.attrs["intervals"]])]
+    lines += [*_cut_off(found), *_doubts(found)]
     return [*lines, *_turned(found), *_other_verdicts(found)]
+
+
+def _not_run(found: xr.Dataset) -> Iterator[str]:
+    for side, name in zip(("first", "second"), names_of(found), strict=True):
+        ran, planned = found.attrs[f"{side}_ran"], found.attrs[f"{side}_planned"]
+        if ran < planned:
+            yield f"{name}: {ran} of {planned} samples have run"
+
+
+_COUNTED = "_doubtful"
+
+
+def _doubtful(found: xr.Dataset) -> dict[str, tuple[int, ...]]:
+    """In how many samples of both runs say that an output may be off, if any does."""
+    return {
+        str(name).removesuffix(_COUNTED): tuple(found[name].values.tolist())
+        for name in found.data_vars if str(name).endswith(_COUNTED)
+    }  # fmt: skip
+
+
+def _doubts(found: xr.Dataset) -> Iterator[str]:
+    """What runs themselves say of their numbers, alike ones together."""
+    alike: dict[tuple[int, ...], list[str]] = {}
+    for name, counts in _doubtful(found).items():
+        alike.setdefault(counts, []).append(name)
+    names, told = names_of(found), list[str]()
+    for counts, outputs in sorted(alike.items(), reverse=True):
+        if found.attrs["runs"]:
+            where = " and ".join(n for n, count in zip(names, counts, strict=True) if count)
+        else:
+            of = found.attrs["first_samples"], found.attrs["second_samples"]
+            where = " and ".join(
+                f"{count} of {size} samples of {name}"
+                for count, size, name in zip(counts, of, names, strict=True)
+            )
+        told.append(f"{', '.join(outputs)} in {where}")
+    if told:
+        yield (
+            f"numbers with{DOUBT} may be off, as their runs say, because steps were too long for "
+            f"the shocks of locks: {'; '.join(told)}"
+        )
+
+
+def _questioned(table: Table, found: xr.Dataset) -> Table:
+    """A table with the mark behind each output that may be off, and requirement or limit on it."""
+    names, limits = _doubtful(found), dict[str, str]()
+    if "limit" in found.dims:
+        limits = dict(zip(found["limit"].values, found["limit_output"].values, strict=True))
+    rows = [
+        (f"{row[0]}{DOUBT}", *row[1:])
+        if row[0] and limits.get(row[0], row[0].split()[0]) in names else row
+        for row in table.rows
+    ]  # fmt: skip
+    return table._replace(rows=rows)
 
 
 def _turned(found: xr.Dataset) -> Iterator[str]:
@@ -100,8 +158,9 @@ def _other_verdicts(found: xr.Dataset) -> Iterator[str]:
     """The requirements whose verdict is another one in the second."""
     for text in found["requirement"].values if "kept_verdict" in found else ():
         first, second = found["kept_verdict"].sel(requirement=text).values.tolist()
+        mark = DOUBT if text.split()[0] in _doubtful(found) else ""
         if first != second:
-            yield f"{text}: {Verdict(first).words} -> {Verdict(second).words}"
+            yield f"{text}{mark}: {Verdict(first).words} -> {Verdict(second).words}"
 
 
 def _cut_off(found: xr.Dataset) -> Iterator[str]:
@@ -133,10 +192,11 @@ def sections(found: xr.Dataset) -> dict[str, Section]:
             _shares(found, "kind", "kind", "outcome"), _changed(found)
         ]),
         Section("requirements", "Requirements", [
-            _shares(found, "kept", "requirement", "samples that meet"), _moved(found)
+            _questioned(_shares(found, "kept", "requirement", "samples that meet"), found),
+            _moved(found),
         ]),
-        Section("limits", "Margins to limits", [_limits(found)]),
-        Section("outputs", "Numbers", [_outputs(found)]),
+        Section("limits", "Margins to limits", [_questioned(_limits(found), found)]),
+        Section("outputs", "Numbers", [_questioned(_outputs(found), found)]),
     )  # fmt: skip
     return {
         each.name: each._replace(tables=tables)

@@ -133,7 +133,7 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             text = f"{text} {unit_text(unit)}".rstrip()
             if np.isfinite(bar):  # samples of a campaign need not have one
                 text += f" +- {bar:.2g}"
-            text = f"{text} {output().told(values, span_names)}".rstrip()
+            text = f"{text} {output().told_of(variable.name, values, span_names)}".rstrip()
             series = values.get(variable.largest_of, ()) if output.limit else ()
             # A limit holds for the whole run, a peak may count up to the last lock. By how much it
             # is larger the series does not say: what ends a run counts all steps.

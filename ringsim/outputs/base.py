@@ -11,6 +11,7 @@ from ringsim.outputs.family import (
     Array,
     ErrorBar,
     Output,
+    Peak,
     Reading,
     Run,
     Series,
@@ -33,6 +34,10 @@ class BaseReaction(Output):
 
     rank = 46
     needs = ("reactions", "held base")
+    peaks = (
+        Peak("peak_base_force", (), "the largest force at the base"),
+        Peak("peak_base_torque", (), "the largest torque at the base"),
+    )
     variables = (
         Variable("base_force", ("axis", "time"), "N", "force of the base on the structure"),
         Variable(
@@ -49,6 +54,7 @@ class BaseReaction(Output):
             error_bar=ErrorBar("largest base torque", safety=3.4),
             summary=("largest base torque", "10.3g"), worse="larger", largest_of="base_torque",
         ),
+        *(variable for peak in peaks for variable in peak.variables),
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
@@ -58,18 +64,15 @@ class BaseReaction(Output):
     def reduce(self, run: Run, series: Series) -> Values:
         """On the output grid; the peaks are those of all steps."""
         force, torque = series.on_grid()
-        peaks = np.linalg.norm(series.values, axis=2).max(axis=0)
-        return {
-            "base_force": force,
-            "base_torque": torque,
-            "peak_base_force": peaks[0],
-            "peak_base_torque": peaks[1],
-        }
+        values: Values = {"base_force": force, "base_torque": torque}
+        for peak, sizes in zip(self.peaks, np.linalg.norm(series.values, axis=2).T, strict=True):
+            values |= {peak.name: sizes.max()} | peak.of(run, series.times, sizes)
+        return values
 
     def shocks(self, run: Run, series: Series) -> dict[str, float]:
         """When the largest force and the largest torque were."""
         moments = series.times[np.linalg.norm(series.values, axis=2).argmax(axis=0)]
-        return dict(zip(("peak_base_force", "peak_base_torque"), moments.tolist(), strict=True))
+        return dict(zip((peak.name for peak in self.peaks), moments.tolist(), strict=True))
 
 
 class BaseRotation(Output):

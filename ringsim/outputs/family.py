@@ -163,7 +163,7 @@ class Peak:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """Whole numbers where the dimension has numbers (-1 if missing), text elsewhere."""
-        types = {"section": "i4", "span": "i4"}
+        types = {"section": "i4", "span": "i4", "winch": "i4"}
         where = (
             Variable(f"{self.name}_{d}", (), "1", f"{d} of {self.words}", types.get(d, "str"))
             for d in self.dims
@@ -196,6 +196,8 @@ class Peak:
         if any(each == "" or each != each for each in (time, *places)):
             return ""
         where = dict(zip(self.dims, places, strict=True))
+        if not where:
+            return f"at {time:.4g} s"
         words = [v if isinstance(v, str) else f"{dim} {v:.0f}" for dim, v in where.items()]
         names = span_names.get(where.get("plane", ""), ())
         if "span" in where and names:
@@ -291,6 +293,8 @@ class Output:
     """What a scene must hold for it, see ``Variable``."""
     peak: ClassVar[Peak | None] = None
     """Variables that tell when and where the value in its summary was."""
+    peaks: ClassVar[tuple[Peak, ...]] = ()
+    """The same of an output with several such values, whose names these have."""
     limit: ClassVar[str] = ""
     """Field of ``ringsim.parts.solver.Limits`` that its largest reading must not pass."""
     of_antenna: ClassVar[bool] = True
@@ -334,6 +338,13 @@ class Output:
     def told(self, values: Values, span_names: SpanNames) -> str:
         """When and where the value in its summary was, in words; empty if that is not known."""
         return "" if self.peak is None else self.peak.told(values, span_names)
+
+    def told_of(self, name: str, values: Values, span_names: SpanNames) -> str:
+        """The same of one of several values in its summary."""
+        if not self.peaks:
+            return self.told(values, span_names)
+        own = (peak for peak in self.peaks if peak.name == name)
+        return "".join(peak.told(values, span_names) for peak in own)
 
 
 def _declared(output: type[Output]) -> dict[str, Variable]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +13,7 @@ from ringsim.cable.winding import MotorWinding
 from ringsim.outputs.family import (
     Array,
     Output,
+    Peak,
     Reading,
     Run,
     Series,
@@ -47,6 +49,12 @@ class Motors(Output):
             ("motor_electrical_energy", "J", "electrical energy that a motor took"),
         )
     )
+    peaks = tuple(
+        Peak(f"peak_{name}", ("plane", "winch"), f"the largest {words} of a motor", name)
+        for name, words in (
+            ("motor_torque", "torque"), ("motor_power", "power"), ("motor_current", "current"),
+        )
+    )  # fmt: skip
     variables = (
         Variable("motor_torque", ("plane", "winch", "time"), "N m", "torque of a motor's shaft"),
         Variable("motor_speed", ("plane", "winch", "time"), "rad/s", "speed of a motor's shaft"),
@@ -76,6 +84,8 @@ class Motors(Output):
             "total_motor_electrical_energy", (), "J",
             "electrical energy that all motors took by the end", needs=_CONSTANTS, worse="larger",
         ),
+        *(variable for peak in peaks[:2] for variable in peak.variables),
+        *(replace(variable, needs=_CONSTANTS) for variable in peaks[2].variables),
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
@@ -128,8 +138,9 @@ class Motors(Output):
         if "torque_constant" in holds(run.scene):
             taken = energy + np.cumsum(lost, axis=0)
             values |= _electrical(series, current, supplied, supplied - power, taken)
-        values["peak_motor_torque"] = np.nanmax(torque)
-        values["peak_motor_power"] = np.nanmax(power)
+        for peak, own in zip(self.peaks, (torque, power, current), strict=True):
+            if np.isfinite(own).any():  # no current of motors that do not tell their constant
+                values |= {peak.name: np.nanmax(own)} | peak.of(run, times, own)
         values["total_motor_energy"] = np.nansum(energy[-1])
         return values
 
@@ -140,11 +151,8 @@ def _electrical(series: Series, *courses: Array) -> Values:
         variable.name: Series(series.times, own, series.grid).on_grid()
         for variable, own in zip(Motors.electrical, courses, strict=True)
     }
-    current, *_, taken = courses
-    return values | {
-        "peak_motor_current": np.nanmax(current),
-        "total_motor_electrical_energy": np.nansum(taken[-1]),
-    }
+    *_, taken = courses
+    return values | {"total_motor_electrical_energy": np.nansum(taken[-1])}
 
 
 def _motors(

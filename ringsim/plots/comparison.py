@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from ringsim.analysis.comparison import paired
+from ringsim.analysis.comparison import paired, samples_of
 from ringsim.analysis.comparison_text import differing, names_of
 from ringsim.analysis.courses import deployed, names_of_ends
 from ringsim.analysis.design import (
@@ -16,7 +16,6 @@ from ringsim.analysis.design import (
     endings,
     judged_by,
     median_and_worst,
-    population_of,
     values_of,
 )
 from ringsim.analysis.intervals import ALIKE, good, hardly_apart, numbers, tells_of, used
@@ -73,8 +72,9 @@ def figures_of_both(
 def _figures(
     found: xr.Dataset, first: xr.Dataset, second: xr.Dataset
 ) -> Iterator[tuple[str, str, Figure]]:
-    both = population_of(first), population_of(second)
+    both = first, second
     if "sample" in first.dims:
+        both, _ = samples_of(first, second)
         known = {name for each in both for name in drawable(each)}
         every = [n for n in differing(found) if n in known]
         names = [n for n in every if not _still(both, n)] or every
@@ -87,7 +87,11 @@ def _figures(
             yield "values", words, _noted(values(found, both, names), unmoved)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
     until = _until(both)
-    drawn = {name: [_course(each, name, until) for each in both] for name in names}
+    lines = _lines_of(both)
+    drawn = {
+        name: [_course(each, name, until, line) for each, line in zip(both, lines, strict=True)]
+        for name in names
+    }
     read = {n: rows for n, rows in drawn.items() if all(np.isfinite(r).any() for _, r in rows)}
     if read:
         yield "courses", "Courses over time in both", courses(found, both, read)
@@ -192,12 +196,11 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
 
 @style.styled
 def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Array]]]) -> Figure:
-    """A panel a quantity over time: of runs their course, of campaigns that of the sample whose
-    asynchrony is the median, or of the base case, with the range of all samples, also of those that
-    are over; ``read`` has times and rows of both by quantity.
+    """A panel a quantity over time: of runs their course, of campaigns that of ``_lines_of``, with
+    the range of all samples, also of those that are over; ``read`` has times and rows of both by
+    quantity.
     """
-    single = "sample" not in both[0].dims
-    lines = [None if single else _line_of(each) for each in both]
+    single, lines = "sample" not in both[0].dims, _lines_of(both)
     names = [
         called if sample is None else f"{called}, line: sample {sample}"
         for called, sample in zip(names_of(found), lines, strict=True)
@@ -222,7 +225,10 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
     if not single:
-        told = dict.fromkeys(map(_bands_told, both))
+        together = found.attrs["pairs"] > 0 and not any(map(of_cases, both))
+        told = dict.fromkeys(
+            [_bands_told(both[0], names_of(found)[0])] if together else map(_bands_told, both)
+        )
         cut = [
             f"{called}: {ran_on.partition(': ')[2]}"
             for each, called in zip(both, names_of(found), strict=True)
@@ -231,6 +237,19 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         figure.legends[0].set_title("\n".join([*told, _OVER, *cut]))
         figure.legends[0].get_title().set_fontsize(9)
     return figure
+
+
+def _lines_of(both: Both) -> list[int | None]:
+    """The samples whose courses are drawn, none of runs: of pairs both of the same."""
+    if "sample" not in both[0].dims:
+        return [None, None]
+    pairs = paired(*both)
+    held = good(both[0])[pairs.first] & good(both[1])[pairs.second]
+    if not held.any() or any(map(of_cases, both)):
+        return [_line_of(each) for each in both]
+    first = _line_of(both[0].isel(sample=pairs.first[held]))
+    places = pairs.second[both[0]["sample"].to_numpy()[pairs.first] == first]
+    return [first, *both[1]["sample"].to_numpy()[places].tolist()]
 
 
 def _line_of(campaign: xr.Dataset) -> int | None:
@@ -242,12 +261,14 @@ def _line_of(campaign: xr.Dataset) -> int | None:
     return None if chosen is None else chosen[0]
 
 
-def _bands_told(campaign: xr.Dataset) -> str:
-    """What is drawn of a campaign."""
+def _bands_told(campaign: xr.Dataset, name: str = "") -> str:
+    """What is drawn of a campaign; of pairs, by the ``name`` of the first."""
     if of_cases(campaign):
         return "Lines are the base case, if there is one; bands span all samples."
     if not judged_by(campaign):
         return "Bands span all samples."
+    if name:
+        return f"Both lines are {middle_told(campaign, name)};\nbands span all samples."
     return f"Each line is {middle_told(campaign, 'its campaign')};\nbands span all samples."
 
 
@@ -274,7 +295,9 @@ def _last(dataset: xr.Dataset) -> float:
     return float(np.nanmax(np.append(dataset["final_time"].to_numpy(), 0.0)))
 
 
-def _course(dataset: xr.Dataset, name: str, until: float) -> tuple[Array, Array]:
+def _course(
+    dataset: xr.Dataset, name: str, until: float, line: int | None
+) -> tuple[Array, Array]:  # fmt: skip
     """Times and rows of a quantity up to a time (s): of a run itself, of a campaign the least, that
     of the sample whose line is drawn, and the largest.
     """
@@ -293,8 +316,8 @@ def _course(dataset: xr.Dataset, name: str, until: float) -> tuple[Array, Array]
     rows = np.full((3, len(at)), np.nan)
     known = np.isfinite(held).any(axis=0)
     rows[0, known], rows[2, known] = np.nanmin(held[:, known], 0), np.nanmax(held[:, known], 0)
-    if (line := held[kept == _line_of(dataset)]).size:
-        rows[1] = line[0]
+    if (own := held[kept == line]).size:
+        rows[1] = own[0]
     return time[at], rows
 
 

@@ -15,6 +15,7 @@ from ringsim.layout.points import points_of
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.registry import picture
+from ringsim.plots.run import mark, peak_of
 from ringsim.scene import Scene, scene_from_toml
 
 _SOURCES = (
@@ -123,7 +124,7 @@ _DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1, 1.5)))
 )
 def motors(dataset: xr.Dataset) -> Figure:
     """A panel for each of ``motor_torque``, ``motor_speed``, ``motor_power`` and, where it is
-    known, ``motor_current`` (plane, winch, time); a line a motor.
+    known, ``motor_current`` (plane, winch, time); a line a motor, a dot at its largest value.
     """
     names = [name for name in _MOTOR if name in dataset and np.isfinite(dataset[name]).any()]
     figure = Figure(figsize=(8.4, 1.9 * len(names) + 1.3))
@@ -131,15 +132,21 @@ def motors(dataset: xr.Dataset) -> Figure:
     there = np.isfinite(dataset["motor_torque"].transpose("plane", "winch", "time").to_numpy())
     places = np.argwhere(there.any(axis=-1)).tolist()
     for axes, name in zip(panels, names, strict=True):
-        rows = dataset[name].transpose("plane", "winch", "time").to_numpy()
+        peak = None
+        if f"peak_{name}" in dataset:  # not of the speed
+            peak = peak_of(dataset, name, f"peak_{name}")
         for number, (plane, winch) in enumerate(places):
-            called = f"{dataset['plane'].values[plane]} cable"
-            called += f", winch {dataset['winch'].values[winch]}" if rows.shape[1] > 1 else ""
-            axes.plot(dataset["time"], rows[plane, winch], label=called,
+            values = dataset[name].isel(plane=plane, winch=winch)
+            called = f"{values['plane'].item()} cable"
+            called += f", winch {values['winch'].item()}" if dataset.sizes["winch"] > 1 else ""
+            own = (values["time"], values) if peak is None else peak.within(values)
+            axes.plot(*own, label=called,
                       color=_LINES[number % len(_LINES)],
                       linestyle=_DASHES[number % len(_DASHES)])  # fmt: skip
         axes.set_ylabel(style.label(dataset[name], width=24), fontsize=9)
         axes.margins(y=0.12)
+        if peak is not None:
+            mark(axes, peak, str(dataset[name].attrs["units"]), f"{peak.place['plane']} cable")
     figure.align_ylabels(panels)
     style.time_axes(dataset, dataset["motor_torque"].max(("plane", "winch")), *panels)
     handles, words = panels[0].get_legend_handles_labels()
@@ -172,7 +179,7 @@ def _loads(dataset: xr.Dataset) -> list[xr.DataArray]:
 def base(dataset: xr.Dataset) -> Figure:
     """Of a base that moves ``base_rotation`` (axis, time) and, where positions are recorded, how
     far the boom's upper end has moved since the start; ``base_force`` and ``base_torque`` where
-    they are recorded.  A line an axis.
+    they are recorded.  A line an axis; of loads also their magnitude, a dot at its largest value.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     shown, told, body = [], list[str](), "base"
@@ -195,9 +202,17 @@ def base(dataset: xr.Dataset) -> Figure:
                       label=f"{axis} axis")  # fmt: skip
         axes.set_ylabel(style.label(values, width=30), fontsize=9)
         axes.margins(y=0.12)
+        if values.name in _LOADS:
+            # Of readings at output times; the shock of a lock lies between two of them.
+            size = (values**2).sum("axis", skipna=False) ** 0.5
+            peak = peak_of(dataset.assign(size=size), "size", f"peak_{values.name}")
+            axes.plot(*peak.within(size), color=style.GREY, linewidth=0.9, zorder=1.5,
+                      label="magnitude")  # fmt: skip
+            mark(axes, peak, str(values.attrs["units"]), "")
     figure.align_ylabels(panels)
     style.time_axes(dataset, shown[0], *panels)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    handles, words = panels[-1].get_legend_handles_labels()
+    figure.legend(handles, words, loc="outside lower center", ncols=len(words))
     subject = " and ".join(filter(None, [", ".join(told[:-1]), told[-1]]))
     style.head(figure, panels[0], dataset, f"{subject.capitalize()} of the {body}")
     return figure

@@ -90,7 +90,7 @@ def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) ->
     early = peak.time < 0.5 * sum(axes.get_xlim())
     style.free(axes.text(
         0.98 if early else 0.02, 0.95 if early else 0.82,
-        f"largest: {told} {units} at {peak.time:.4g} s\n{place}", transform=axes.transAxes,
+        f"largest: {told} {units} at {peak.time:.4g} s\n{place}".strip(), transform=axes.transAxes,
         va="top", ha="right" if early else "left", color=style.VERMILLION, bbox=style.PAPER,
         zorder=5,
     ))  # fmt: skip

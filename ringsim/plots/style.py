@@ -311,7 +311,7 @@ def scene_title(dataset: xr.Dataset) -> str:
     text, count = str(dataset.attrs.get("title", "")).strip(), dataset.sizes.get("section")
     if count is None:
         return text
-    true, told = re.subn(r"\b\d+-section\b", f"{count}-section", text)
+    true, told = re.subn(r"\b\d+([- ])section(s?)\b", rf"{count}\1section\2", text)
     return true if told else f"{text}, {counted(count, 'section')}".removeprefix(", ")
 
 
@@ -409,13 +409,18 @@ def from_zero(axes: Axes) -> None:
     axes.set_ylim(0.0, 1.08 * axes.get_ylim()[1])
 
 
+_NOTHING = 1e-6
+"""Share of the largest value below which a force is that of a slack rope, 1e-89 N."""
+
+
 def signed_sizes(axes: Axes, sizes: np.ndarray) -> None:
     """Value axis of both signs; logarithmic on either side where most would be a flat line.
 
     ``sizes`` is what was drawn, of any shape, NaN where nothing was recorded; see ``span_sizes``.
     """
-    known = np.abs(sizes[np.isfinite(sizes) & (sizes != 0.0)])
+    known = np.abs(sizes[np.isfinite(sizes)])
     largest = float(known.max(initial=0.0)) or 1.0
+    known = known[known > _NOTHING * largest]
     least, most = np.nanmin(sizes, initial=0.0), np.nanmax(sizes, initial=0.0)
     room = 0.05 * largest
     if not known.size or np.median(known) > _FLAT * largest:
@@ -425,11 +430,10 @@ def signed_sizes(axes: Axes, sizes: np.ndarray) -> None:
     axes.set_yscale("symlog", linthresh=linear, linscale=0.3)
     axes.set_ylim(2.0 * min(least, -0.5 * linear), 2.0 * max(most, 0.5 * linear))
     plain_numbers(axes.yaxis)
-    if least < 0.0 < most:  # labels beside zero would lie on that of zero
-        beside = 1.01 * linear
-        axes.yaxis.set_major_formatter(
-            FuncFormatter(lambda value, _: "" if 0.0 < abs(value) < beside else f"{value:g}")
-        )
+    beside = 1.01 * linear  # labels there would lie on that of zero
+    axes.yaxis.set_major_formatter(
+        FuncFormatter(lambda value, _: "" if 0.0 < abs(value) < beside else f"{value:g}")
+    )
 
 
 def limit_of(dataset: xr.Dataset, name: str) -> float:

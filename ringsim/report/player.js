@@ -11,14 +11,14 @@
   const joints = ring.joints;
   const LOOKS = {
     diagonals: ["#0072b2", 1.5], bars: ["#b5552a", 1.5], "hinge assemblies": ["#222222", 3],
-    boom: ["#6e6e6e", 5], net: ["#8fcfb5", 0.9],
+    boom: ["#6e6e6e", 5], net: ["#8fcfb5", 0.9], spacecraft: ["#cc79a7", 2],
   };
   const byId = (name) => document.getElementById(name);
   const canvas = byId("scene"), pen = canvas.getContext("2d");
   const slider = byId("moment"), button = byId("play"), told = byId("told");
   let sample = samples[0], time = 0, azimuth = 0.75, elevation = 0.45, playing = false, last = 0;
 
-  const end = () => sample.times[sample.times.length - 1];
+  const end = () => sample.end;
 
   // The frame after a value, and how far that is on the way to it.
   function between(values, value) {
@@ -35,12 +35,16 @@
     });
   }
 
-  // Opening angles in degree of all V-joints at a time, linear between frames.
+  // Opening angles in degree of all V-joints at a time, linear between frames and to their locks.
   function anglesAt(moment) {
     const [k, w] = between(sample.times, moment), found = [];
+    const late = moment > sample.times[k], from = late ? k : k - 1, begin = sample.times[from];
     for (let j = 0; j < joints; j += 1) {
-      const a = sample.angles[(k - 1) * joints + j], b = sample.angles[k * joints + j];
-      found.push(a === UNKNOWN || b === UNKNOWN ? NaN : (a + w * (b - a)) / 100);
+      const a = sample.angles[from * joints + j], lock = sample.locks[j];
+      const locks = lock !== null && (late || lock <= sample.times[k]);
+      const b = locks ? 18000 : sample.angles[k * joints + j];
+      const share = !locks ? w : moment >= lock ? 1 : (moment - begin) / (lock - begin);
+      found.push(a === UNKNOWN || b === UNKNOWN ? NaN : (a + share * (b - a)) / 100);
     }
     return found;
   }
@@ -123,6 +127,12 @@
       pen.moveTo(seen[from][0], seen[from][1]);
       pen.lineTo(seen[to][0], seen[to][1]);
       pen.stroke();
+    }
+    if (ring.craft !== null) {
+      const [x, y] = seen[ring.craft];
+      pen.globalAlpha = 1;
+      [pen.fillStyle] = LOOKS.spacecraft;
+      pen.fillRect(x - 6, y - 6, 12, 12);
     }
     const faces = angles.map((angle, j) => [angle, seen[ring.fixed + j]]).sort((a, b) => a[1][2] - b[1][2]);
     for (const [angle, [x, y]] of faces) dot(x, y, 4.5, angle - mean, angle > 179.99);

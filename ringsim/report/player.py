@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from ringsim.analysis.courses import deployed
 from ringsim.analysis.design import REACHED, UNKNOWN, endings, judged_by, median_and_worst
 from ringsim.analysis.intervals import used
 from ringsim.layout.layout import layout_at_opening, layout_of
-from ringsim.layout.points import points_of
+from ringsim.layout.points import Points, points_of
 from ringsim.plots.campaign.frame import base_of, of_cases
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import COMPUTED, FROM_ANGLES, middle_of
@@ -36,7 +38,7 @@ def player(campaign: xr.Dataset, analysis: xr.Dataset) -> dict[str, Any] | None:
     scene = scene_from_toml(str(campaign.attrs["scene"]), source="attribute scene")
     if "opening_angle" not in campaign or not points_of(layout_of(scene)).openings.size:
         return None
-    shown = [_course(campaign, *each) for each in _chosen(campaign, analysis)]
+    shown = [_course(campaign, scene, *each) for each in _chosen(campaign, analysis)]
     if not shown:
         return None
     lowest = min(each.pop("lowest") for each in shown)
@@ -100,18 +102,37 @@ def _recorded(campaign: xr.Dataset, sample: int) -> bool:
     return int(angle.notnull().all(("plane", "section")).sum()) >= 2
 
 
-def _course(campaign: xr.Dataset, sample: int, name: str) -> dict[str, Any]:
-    """Times and opening angles in 0.01 degree, (frame, V-joint), of one sample."""
+def _course(campaign: xr.Dataset, scene: Scene, sample: int, name: str) -> dict[str, Any]:
+    """Times and opening angles in 0.01 degree, (frame, V-joint), of one sample; see ``_locks``."""
     angle = campaign["opening_angle"].sel(sample=sample).transpose("time", "plane", "section")
     angle = angle.dropna("time", how="any")
     angle = _thinned(angle, MOST_FRAMES)
-    rows = angle.to_numpy().reshape(angle.sizes["time"], -1)
+    rows, times = angle.to_numpy().reshape(angle.sizes["time"], -1), angle["time"].to_numpy()
+    locks, end = _locks(campaign, scene, sample, float(times[-1]))
     return {
-        "name": name, "sample": sample, "times": np.round(angle["time"].to_numpy(), 4).tolist(),
+        "name": name, "sample": sample, "times": np.round(times, 4).tolist(),
+        "locks": locks, "end": round(end, 4),
         "angles": packed(np.clip(100.0 * rows, UNRECORDED, _LARGEST)),
         "lowest": float(rows.mean(axis=1).min()),
-        "places": _places(campaign, sample),
+        "places": _places(campaign, scene, sample),
     }  # fmt: skip
+
+
+def _locks(
+    campaign: xr.Dataset, scene: Scene, sample: int, last: float
+) -> tuple[list[float | None], float]:
+    """From when on each V-joint is at 180 deg, s, None where records tell it, and the end of a
+    course whose ``last`` record may be before the last lock.
+
+    Of deployed rings alone; without latches V-joints may leave 180 deg again.
+    """
+    one = campaign.sel(sample=[sample])
+    if "lock_time" not in one or not deployed(one).all():
+        return [None] * (campaign.sizes["plane"] * campaign.sizes["section"]), last
+    latched = scene.stop is not None and scene.stop.latch
+    times = one["lock_time"].transpose("sample", "plane", "section").to_numpy().ravel().tolist()
+    end = max(last, float(one["deployment_time"][0]))
+    return [round(time, 4) if latched or time > last else None for time in times], end
 
 
 def _thinned(series: xr.DataArray, most: int) -> xr.DataArray:
@@ -120,7 +141,7 @@ def _thinned(series: xr.DataArray, most: int) -> xr.DataArray:
     return series.isel(time=np.unique(np.linspace(0, last, most).round().astype(int)))
 
 
-def _places(campaign: xr.Dataset, sample: int) -> dict[str, Any] | None:
+def _places(campaign: xr.Dataset, scene: Scene, sample: int) -> dict[str, Any] | None:
     """Times, unit (m) and positions, (frame, point, axis), of one sample; None if not recorded."""
     if "position" not in campaign:
         return None
@@ -133,9 +154,28 @@ def _places(campaign: xr.Dataset, sample: int) -> dict[str, Any] | None:
     values = found.to_numpy()
     # The player turns the ring about its middle at the end; on the way it is where it is.
     values = values - 0.5 * (values[-1].min(axis=0) + values[-1].max(axis=0))
+    turns = np.zeros((found.sizes["time"], 3))
+    if "base_rotation" in campaign:
+        turned = campaign["base_rotation"].sel(sample=sample).transpose("time", "axis")
+        turns = np.nan_to_num(np.radians(turned.sel(time=found["time"]).to_numpy()))
+    values = _with_spacecraft(scene, points_of(layout_of(scene)), values, turns)
     unit = float(np.abs(values).max()) / _LARGEST
     times = np.round(found["time"].to_numpy(), 4).tolist()
     return {"times": times, "unit": unit, "points": packed(values / unit)}
+
+
+def _with_spacecraft(
+    scene: Scene, points: Points, places: NDArray[Any], turns: NDArray[Any]
+) -> NDArray[Any]:  # fmt: skip
+    """Places, (frame, point, axis), m, with the spacecraft's centre of mass, if the scene has one,
+    before the joints that open; ``turns`` are rotation vectors of the base, (frame, axis), rad.
+    """
+    base = layout_of(scene).base
+    if scene.spacecraft is None or base is None:
+        return places
+    arm = Rotation.from_rotvec(turns).apply(np.array(scene.spacecraft.centre))
+    centre = places[:, points.of_body(base)] + arm
+    return np.insert(places, len(points.names) - points.openings.size, centre, axis=1)
 
 
 def _poses(scene: Scene, lowest: float) -> dict[str, Any]:
@@ -154,15 +194,20 @@ def _poses(scene: Scene, lowest: float) -> dict[str, Any]:
             points.places(layout, angle * shape) - middle_of(layout) for angle in (np.pi, 0.0)
         )
         poses.append(np.concatenate([flat, folded[fixed:] - flat[fixed:]]))
-    whole = np.array(poses)
+    whole = _with_spacecraft(scene, points, np.array(poses), np.zeros((len(poses), 3)))
+    craft = whole.shape[1] > len(poses[0])
+    lines = [
+        [*(int(point) + (craft and point >= fixed) for point in pair), group]
+        for group, pairs in enumerate(points.lines.values()) for pair in pairs.tolist()
+    ]  # fmt: skip
+    if craft and first.base is not None:
+        lines.append([points.of_body(first.base), fixed, len(points.lines)])
     unit = float(np.abs(whole).max()) / _LARGEST
     return {
         "means": np.degrees(means).round(4).tolist(), "unit": unit, "points": packed(whole / unit),
-        "fixed": fixed, "joints": points.openings.size, "groups": [*points.lines],
-        "lines": [
-            [*pair, group] for group, pairs in enumerate(points.lines.values())
-            for pair in pairs.tolist()
-        ],
+        "fixed": fixed + craft, "joints": points.openings.size,
+        "groups": [*points.lines, *["spacecraft"] * craft], "lines": lines,
+        "craft": fixed if craft else None,
     }  # fmt: skip
 
 

@@ -38,6 +38,8 @@ def written(
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     shell.filters |= {"sentence": _sentence, "head": _head, "parted": _parted}
+    sizes = {name: tuple(figure.get_size_inches()) for name, _, figure in drawn}
+    shell.filters["sheets"] = lambda some: sheets([(sizes[one[0]], one) for one in some])
     shape, text = shell.get_template(template), ""
     each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
@@ -51,6 +53,39 @@ def written(
 def _apart(figures: list[tuple[str, str, str]], names: Collection[str]) -> dict[str, Any]:
     own = {each[0]: each for each in figures if each[0] in names}
     return {"figures": [each for each in figures if each[0] not in own], "beside": own}
+
+
+_SHEET = 7.1, 10.2
+"""Width and height of what is printed of a sheet below a heading, inch."""
+_CAPTION = 0.4
+"""Height of a caption and what is around it, inch."""
+_LEAST, _MOST = 0.57, 0.85
+"""Scales of printed figures: smaller letters could hardly be read, larger ones are those of texts;
+between them a sheet is full."""
+
+
+def sheets(figures: list[tuple[tuple[float, float], Any]]) -> list[tuple[float, list[Any]]]:
+    """Figures, each behind its size in inch, by the sheets of paper that print them, and the scale
+    of each sheet.
+
+    Each goes to the first sheet that has room: what does not fit would leave a sheet half empty.
+    """
+    made: list[list[tuple[tuple[float, float], Any]]] = []
+    for each in figures:
+        own = next((s for s in made if _height([*s, each], _LEAST) <= _SHEET[1]), None)
+        if own is None:
+            made.append(own := [])
+        own.append(each)
+    scales = np.arange(_MOST, _LEAST, -0.01).round(2).tolist()
+    return [
+        (next((s for s in scales if _height(own, s) <= _SHEET[1]), _LEAST), [f for _, f in own])
+        for own in made
+    ]
+
+
+def _height(figures: list[tuple[tuple[float, float], Any]], scale: float) -> float:
+    """What figures at a scale need of a sheet, none wider than it, inch."""
+    return sum(min(scale, _SHEET[0] / wide) * high + _CAPTION for (wide, high), _ in figures)
 
 
 def _sentence(line: str) -> str:

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from ringsim.cli import cli
 from ringsim.outputs.balance import summary
+from ringsim.outputs.base import BaseReaction
 from ringsim.outputs.cables import CableTension, NetTension
 from ringsim.outputs.family import Run, Series, axes
 from ringsim.outputs.joints import Asynchrony
@@ -191,6 +192,34 @@ def test_a_run_tells_what_its_series_hold(fidelity, tmp_path) -> None:
         for who in ("leader", "laggard")
     )
     assert (first - last).item() == pytest.approx(run.asynchrony_max.item(), rel=1e-3)
+
+
+def test_loads_at_the_base_tell_when_each_was_largest() -> None:
+    """By their magnitude, whatever the largest component."""
+    loads = np.random.default_rng(5).uniform(-1.0, 1.0, (9, 2, 3))
+    loads[3, 0], loads[6, 1] = 3.0, -4.0
+    loads[5, 0, 0] = 4.0
+    found = BaseReaction().reduce(STILL, Series(TIMES, loads, STILL.angles.grid))
+    assert found["peak_base_force"] == pytest.approx(27.0**0.5)
+    assert found["peak_base_torque"] == pytest.approx(48.0**0.5)
+    for name, when in (("peak_base_force", 0.75), ("peak_base_torque", 1.5)):
+        assert found[f"{name}_time"] == when
+        assert BaseReaction().told_of(name, found, {}) == f"at {when:g} s"
+    assert BaseReaction().told_of("peak_base_force", {"peak_base_force": 3.0}, {}) == ""
+
+
+def test_the_largest_of_motors_are_told_with_time_and_plane() -> None:
+    """On output times much closer than steps the series come near to the peaks, and only there."""
+    values = {"solver.end_time": 0.1, "record.interval": 1e-4}
+    values |= {f"cables.{each}.winch.winding.torque_constant": 0.02 for each in ("upper", "lower")}
+    run = simulate(load_scene("ring18-motor").with_values(values), "frame")
+    told = summary({str(name): each.values for name, each in run.variables.items()}, {})
+    for name in ("motor_torque", "motor_power", "motor_current"):
+        place = {dim: run[f"peak_{name}_{dim}"].item() for dim in ("plane", "winch")}
+        near = run[name].sel(place).sel(time=run[f"peak_{name}_time"], method="nearest")
+        assert near.item() == pytest.approx(run[f"peak_{name}"].item(), rel=1e-3)
+        assert run[name].max().item() <= run[f"peak_{name}"].item() * (1.0 + 1e-3)
+        assert f" at {run[f'peak_{name}_time'].item():.4g} s: " in told[f"peak_{name}"]
 
 
 CAMPAIGN = """

@@ -137,6 +137,24 @@ def test_planes_stand_one_below_the_other_with_one_scale() -> None:
             assert all(band.get_facecolor()[0, 3] <= 0.2 for band in axes.collections)
 
 
+def test_the_time_in_which_things_happen_is_enlarged() -> None:
+    """Sections are apart in the last 2 of 10 s alone; a row above the panels has the whole run."""
+    campaign = made_campaign(5)
+    angle = campaign["opening_angle"]
+    mean, late = angle.mean(("plane", "section")), campaign["time"] >= 8.0
+    campaign["opening_angle"] = angle.where(late, mean).transpose(*angle.dims)
+    figure = fan(campaign)
+    whole, *panels = sorted(figure.axes, key=lambda axes: -axes.get_position().y1)
+    assert whole.get_xlim() == (0.0, 10.0)
+    apart = (angle - mean).where(late, 0.0).max(("sample", "plane", "section"))
+    edges = whole.collections[0].get_paths()[0].vertices[:, 1]
+    assert edges.max() == pytest.approx(float(apart.max()), rel=1e-5)
+    begin, end = panels[0].get_xlim()
+    assert 7.0 < begin < 8.0 < end <= 10.0
+    assert {axes.get_xlim() for axes in panels} == {(begin, end)}
+    assert len(panels) == 2 * SECTIONS
+
+
 def test_quantiles_do_not_depend_on_how_the_file_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sample at a time and a point of the axis at a time, with a record lost in one sample."""
     campaign = made_campaign(9, failed=(2,), not_run=(5,))
@@ -194,7 +212,7 @@ def test_curves_of_samples_that_lag_in_turn_are_of_a_sample_not_of_an_instant() 
     ]  # fmt: skip
     edges = [band.get_paths()[0].vertices[:, 1].max() for band in axes.collections]
     assert edges == pytest.approx([8.6, 17.2])
-    assert "asynchrony_max is the median of its campaign; bands span all samples" in caption(both)
+    assert "asynchrony_max is the median of slow; bands span all samples" in caption(both)
 
 
 def test_courses_by_ending_are_of_its_median_sample() -> None:

@@ -78,6 +78,7 @@ def test_a_run_that_does_not_tell_its_outcome_gives_the_reason(unfinished):
 
 @for_each(("title", "wanted"), [
     ("18-section ring, 2 cables", "2-section ring, 2 cables"),
+    ("Ring of 8 m, 18 sections, two cables", "Ring of 8 m, 2 sections, two cables"),
     ("Truss of paper 000", "Truss of paper 000, 2 sections"),
     ("", "2 sections"),
 ])  # fmt: skip

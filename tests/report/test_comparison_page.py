@@ -127,8 +127,8 @@ def test_figures_draw_the_samples_of_both(both: tuple[xr.Dataset, xr.Dataset]) -
     (place,) = (k for k, each in enumerate(labels) if "difference of opening angles" in each)
     axes = drawn["courses"].axes[place]
     first, second = axes.lines
-    for line, each in ((first, both[0]), (second, both[1])):
-        middle, _ = median_and_worst(each)
+    middle, _ = median_and_worst(both[0].isel(sample=np.flatnonzero(held)))
+    for line, each in ((first, both[0]), (second, both[1])):  # the same antenna in both
         row = each["asynchrony"].sel(sample=middle).to_numpy()[: len(line.get_xdata())]
         count = np.isfinite(row)
         assert line.get_ydata()[count] == pytest.approx(row[count])
@@ -271,7 +271,8 @@ def test_one_pair_of_many_samples_is_no_pair_of_runs(
     found = compare(first, second)
     assert (found.attrs["pairs"], found.attrs["runs"]) == (1, 0)
     lines = compared(found)
-    assert "samples are paired by their seeds (1 pair of 2 and 5 samples)" in lines
+    told = "samples are paired by their seeds (1 pair of 2 and 5 samples that have run: "
+    assert f"{told}all tables and figures are of these pairs)" in lines
     (table,) = sections(found)["outputs"].tables
     assert "worse in" not in table.head
     assert table.head[0] == "mean of"
@@ -279,6 +280,49 @@ def test_one_pair_of_many_samples_is_no_pair_of_runs(
     assert runs.attrs["runs"] == 1
     (ends,) = sections(runs)["outcomes"].tables
     assert ends.rows == [("outcome", "deployed", "deployed")]
+
+
+def test_all_tables_and_figures_are_of_the_pairs_that_have_run() -> None:
+    """Of ten and six samples, of which the last two have not run: four pairs."""
+    one, other = made_campaign(10), made_campaign(6, not_run=(4, 5))
+    other["asynchrony_max"] *= 0.5
+    found = compare(one, other, ("ground", "flight"))
+    lines = compared(found)
+    told = "samples are paired by their inputs (4 pairs of 10 and 4 samples that have run: "
+    assert f"{told}all tables and figures are of these pairs)" in lines
+    assert "flight: 4 of 6 samples have run" in lines
+    assert "not run" not in found["kind"].values
+    assert found["kind_compared"].values.tolist() == [[4, 4]]
+    drawn = {name: figure for name, _, figure in figures_of_both(found, one, other)}
+    titles = [a.get_title("left") for a in drawn["values"].axes if a.get_visible()]
+    assert set(titles) == {"n = 4 of 4, 4 of 4"}
+    legend = [text.get_text() for text in drawn["courses"].legends[0].get_texts()]
+    assert len({text.partition("line: ")[2] for text in legend}) == 1
+
+
+def test_numbers_that_runs_call_uncertain_are_marked_and_counted(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    said = "deployed; steps of 9 ms at the lock at 3 s are too long for shocks in the rods (period "
+    said += "54 ms), so asynchrony_max, peak_tension may be off: set solver.tolerance = 1e-5"
+    reasons = np.array(["deployed"] * 8, dtype=object)
+    reasons[[0, 1, 3]] = said
+    one, two = both[0], both[1].assign(reason=("sample", reasons))
+    found = compare(one, two, ("ground", "flight"))
+    lines = compared(found)
+    (told,) = (line for line in lines if "may be off" in line)
+    where = "in 0 of 8 samples of ground and 3 of 8 samples of flight"
+    assert told.endswith(f": asynchrony_max, peak_tension {where}")
+    rows = [row[0] for part in sections(found).values() for t in part.tables for row in t.rows]
+    marked = {row for row in rows if row.endswith(" ?")}
+    assert marked == {r for r in rows if r.startswith(("asynchrony_max", "peak_tension"))}
+    assert len(marked) >= 2  # the mean, and the requirement on it
+    assert "peak_tension ?" in re.sub("<wbr>", "", comparison_page(found, one, two))
+    runs = [each.isel(sample=0, drop=True) for each in (one, two)]
+    runs[1].attrs["reason"] = said
+    (told,) = (line for line in compared(compare(*runs, ("a", "b"))) if "may be off" in line)
+    assert told.endswith(": asynchrony_max, peak_tension in b")
+    assert not any("may be off" in line for line in compared(compare(*both)))
 
 
 def test_engines_and_what_is_drawn_are_told_apart(both: tuple[xr.Dataset, xr.Dataset]) -> None:

@@ -26,6 +26,8 @@ from ringsim.analysis.study_text import (
 )
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.layout.layout import layout_of
+from ringsim.layout.points import points_of
 from ringsim.plots import figures as of_campaigns
 from ringsim.plots.ring import lines_at
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
@@ -34,6 +36,7 @@ from ringsim.report import shell
 from ringsim.report.page import page
 from ringsim.report.player import player
 from ringsim.report.shell import LARGEST
+from ringsim.scene import load_scene
 from ringsim.shapes import COMPUTED, FROM_ANGLES
 from ringsim.tables import interval_text, number_text, slim
 
@@ -347,6 +350,39 @@ def test_the_player_has_the_positions_that_were_computed() -> None:
     assert shown(only)["words"] == f"{COMPUTED}, or {FROM_ANGLES}"  # type: ignore[index]
 
 
+def test_the_player_ends_where_the_ring_is_deployed() -> None:
+    """At its last lock, which lies behind the last record."""
+    campaign = made_campaign(8, **KINDS["mixed"])
+    campaign["opening_angle"][..., -3:] = np.nan
+    data = shown(campaign)
+    assert data is not None
+    for each in data["samples"]:
+        own = campaign.sel(sample=each["sample"])
+        locks = [None if np.isnan(t) else t for t in own["lock_time"].values.ravel()]
+        assert each["locks"] == locks
+        deployed = np.isfinite(own["deployment_time"].item())
+        assert each["end"] == (10.0 if deployed else each["times"][-1])
+        assert each["times"][-1] < 9.0
+
+
+def test_the_player_draws_the_spacecraft() -> None:
+    """On the boom's upper end, in every pose."""
+    scene = load_scene("ring18-flight").with_values({"structure.sections": SECTIONS})
+    data = shown(made_campaign(2).assign_attrs(scene=scene.to_toml()))
+    assert data is not None
+    ring = data["ring"]
+    points = np.frombuffer(base64.b64decode(ring["points"]), "<i2")
+    points = ring["unit"] * points.reshape(len(ring["means"]), -1, 3)
+    named = points_of(layout_of(scene))
+    top = named.of_body(layout_of(scene).base)
+    arm = points[:, ring["craft"]] - points[:, top]
+    np.testing.assert_allclose(arm, np.tile(scene.spacecraft.centre, (len(arm), 1)), atol=1e-3)
+    (line,) = [each for each in ring["lines"] if ring["groups"][each[2]] == "spacecraft"]
+    assert line[:2] == [top, ring["craft"]]
+    joints = {point for *pair, _ in ring["lines"] for point in pair if point > ring["craft"]}
+    assert max(joints) == ring["fixed"] + ring["joints"] - 1
+
+
 def shown(campaign: xr.Dataset) -> dict | None:
     return player(campaign, analyse(campaign))
 
@@ -513,6 +549,19 @@ def test_a_table_without_a_figure_of_its_own_goes_before_the_figures(
     assert text.count('<section id="matters">') == 1
     assert (text.index('<section id="matters">') < text.index('<section id="figures">')) == alone
     assert '<p class="note">.</p>' not in text
+
+
+def test_printed_figures_fill_their_sheets() -> None:
+    """A4 has 7.17 x 10.59 inch within its margins; what does not fit a sheet goes on another."""
+    sizes = [(11.1, 10.2), (8.6, 6.2), (10.5, 8.9), (8.4, 5.6), (9.8, 5.7), (10.5, 19.0)]
+    made = shell.sheets([(size, name) for name, size in enumerate(sizes)])
+    assert sorted(name for _, own in made for name in own) == list(range(len(sizes)))
+    for scale, own in made:
+        heights = [min(scale, 7.17 / sizes[k][0]) * sizes[k][1] + 0.385 for k in own]
+        assert 0.57 <= scale <= 0.85
+        assert len(own) == 1 or sum(heights) < 10.59 - 0.4  # of a heading
+    assert [own for _, own in made] == [[0, 1], [2], [3, 4], [5]]
+    assert made[2][0] > 0.7  # two small ones are drawn larger
 
 
 def test_long_heads_may_be_broken_at_underscores() -> None:

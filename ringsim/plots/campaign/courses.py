@@ -50,7 +50,8 @@ _MOST_CASES = 60
 def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     """A panel a section and plane, one below the other: the deviations of the samples whose
     asynchrony is the median and the largest, and the range of all, or each sample where they are
-    cases, with one scale.
+    cases, with one scale.  Where most of the time little happens, they are enlarged on the rest
+    (``_eventful``), and a row above them has the whole run.
 
     ``campaign`` has ``opening_angle`` (sample, plane, section, time).  ``read`` is what ``courses``
     gives, if it is there already.
@@ -64,13 +65,21 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     columns = min(_WIDEST, len(sections))
     blocks = -(-len(sections) // columns)
     rows = blocks * len(planes)
-    figure = Figure(figsize=(max(1.75 * columns, 7.0), max(1.3 * rows, 2.4) + 2.0))
-    grid = figure.subplots(rows, columns, squeeze=False)
+    begin, end = _eventful(found)
+    wide, heights = max(1.75 * columns, 7.0), [max(1.3, 2.4 / rows)] * rows
     limits = _limits([each for each in (found, one) if each is not None])
+    if begin > 0.0 or end < float(found["time"][-1]):
+        figure = Figure(figsize=(wide, sum(heights) + _WHOLE + 2.4))
+        places = figure.add_gridspec(rows + 1, columns, height_ratios=[_WHOLE, *heights])
+        grid = places[1:, :].subgridspec(rows, columns).subplots(squeeze=False)
+        _whole(figure.add_subplot(places[0, :]), found, (begin, end), limits)
+    else:
+        figure = Figure(figsize=(wide, sum(heights) + 2.0))
+        grid = figure.subplots(rows, columns, squeeze=False)
     axes: Axes
     for place, axes in enumerate(grid.ravel()):
         # By itself, and before its curves: axes that are shared ask each other for limits.
-        axes.set(xlim=(0.0, float(found["time"][-1]) or 1.0), ylim=limits)
+        axes.set(xlim=(begin, end or 1.0), ylim=limits)
         axes.xaxis.set_major_locator(MaxNLocator(3))
         axes.label_outer()
         row, column = divmod(place, columns)
@@ -121,6 +130,40 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     note = f"{told(campaign, len(read.samples))}. {note}{ran_on}"
     head(figure, campaign, "Ahead and behind", note)
     return figure
+
+
+_WHOLE = 1.3
+"""Height of the row that has the whole run, inch."""
+_LITTLE, _SHORT, _AROUND = 0.1, 0.5, 0.15
+"""Share of the largest deviation that is little; share of the time below which what happens is
+enlarged, and what of its length is drawn before and behind it."""
+
+
+def _eventful(found: xr.DataArray) -> tuple[float, float]:
+    """Begin and end (s) of the time in which any V-joint of any sample deviates by more than a
+    tenth of the largest; the whole time where that is more than half of it.
+    """
+    time, size = found["time"].to_numpy(), abs(found).max(("quantile", "plane", "section"))
+    far = time[size.to_numpy() > _LITTLE * float(size.max())]
+    if not len(far):
+        return 0.0, float(time[-1])
+    around = _AROUND * (far[-1] - far[0])
+    begin, end = max(0.0, far[0] - around), min(float(time[-1]), far[-1] + around)
+    short = 0.0 < end - begin < _SHORT * time[-1]
+    return (float(begin), float(end)) if short else (0.0, float(time[-1]))
+
+
+def _whole(
+    axes: Axes, found: xr.DataArray, part: tuple[float, float], limits: tuple[float, float]
+) -> None:
+    """The range of all sections of both planes over the whole time, and the enlarged part of it."""
+    ends = found.min(("quantile", "plane", "section")), found.max(("quantile", "plane", "section"))
+    axes.fill_between(found["time"], *ends, facecolor=(style.GREY, 0.3), linewidth=0.5,
+                      edgecolor=style.GREY)  # fmt: skip
+    axes.axvspan(*part, color=style.ORANGE, alpha=0.2, linewidth=0.0)
+    axes.set(xlim=(0.0, float(found["time"][-1])), ylim=limits)
+    low, high = part
+    axes.set_title(f"all sections; below: {low:.3g} to {high:.3g} s, enlarged", fontsize=9, pad=3)
 
 
 def _shown(campaign: xr.Dataset, read: Courses) -> tuple[Courses, str]:

@@ -214,9 +214,7 @@ def explained(campaign: xr.Dataset) -> bool:
     return varied and bool(drawn(campaign).names) and not told_apart
 
 
-@picture(
-    "campaign", 90, "Which inputs matter for each main number, with intervals", applies=explained
-)
+@picture("campaign", 90, "Which inputs matter for each main number", applies=explained)
 def tornado(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a bar an input or group; whiskers are 95 % intervals."""
     # Those that something is required of first: a page has no room for all.
