@@ -38,7 +38,15 @@ class OneOf:
 
 def kinds_of(family: type[Model]) -> dict[str, type[Model]]:
     """All kinds of a family by name."""
-    return {str(kind.model_fields["kind"].default): kind for kind in leaves_of(family)}
+    found: dict[str, type[Model]] = {}
+    for kind in leaves_of(family):
+        word = str(kind.model_fields["kind"].default)
+        if (other := found.setdefault(word, kind)) is not kind:
+            raise ValueError(
+                f"kind {word} is defined twice, in {other.__module__} and in {kind.__module__}: "
+                "rename yours"
+            )
+    return found
 
 
 def kind_of(record: Model) -> str:

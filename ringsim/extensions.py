@@ -5,6 +5,8 @@ then on are choices as all others.  A module is a file or a package beside the f
 an installed module, or an entry point of the group ``ringsim``.
 """
 
+import ast
+import contextlib
 import hashlib
 import importlib
 import importlib.util
@@ -20,6 +22,7 @@ from typing import Any
 
 from ringsim.refusal import InputError, known_or_nearest, show
 
+_NAMES = re.compile(r"[A-Za-z_][\w-]*(?:\.[A-Za-z_]\w*)*|[^\0\n]+\.py")
 GROUP = "ringsim"
 """Entry points of installed packages."""
 LISTED = re.compile(r"^imports = \[[^\]]*\]\n", re.MULTILINE)
@@ -45,6 +48,11 @@ def names_in(table: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _beside(name: str, folder: Path) -> str:
     """The path of a module or package beside a file; empty if none is there."""
+    if not _NAMES.fullmatch(name):
+        raise InputError(
+            f"imports = {show(name)}: must be the name of a module, such as my_laws, or of a file "
+            "that ends with .py"
+        )
     given = folder / name
     if given.suffix == ".py":
         return str(given.absolute())
@@ -72,9 +80,8 @@ def load(names: Sequence[str]) -> None:
 def digest(names: Sequence[str]) -> str:
     """Digest of the files of modules that were loaded; empty of none.
 
-    Of a package it is of all its files, of a module of its own file alone: what belongs to it
-    stands in the package, or is no part of what decides about results.  InputError if a file has
-    changed since it was loaded.
+    Of a package it is of all its files, of a module of its own and of those beside it that it
+    imports.  InputError if a file has changed since it was loaded.
     """
     load(names)
     every = []
@@ -94,12 +101,35 @@ def _digest(module: ModuleType) -> str:
         folder = Path(next(iter(paths)))
         files = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*.py")}
     else:
-        files = {"": Path(str(module.__file__))}
+        files = _with_helpers(Path(str(module.__file__)))
     found = hashlib.blake2b(digest_size=6)
     for place in sorted(files):
         content = files[place].read_bytes()
         found.update(f"{place} {len(content)} ".encode() + content)
     return found.hexdigest()
+
+
+def _with_helpers(file: Path) -> dict[str, Path]:
+    """A file and those beside it that it imports, and so on, by their places."""
+    found, left = {"": file}, [file]
+    while left:
+        try:
+            tree = ast.parse(left.pop().read_bytes())
+        except (SyntaxError, ValueError):
+            continue
+        names = [each.name for node in ast.walk(tree) if isinstance(node, ast.Import)
+                 for each in node.names]  # fmt: skip
+        names += [node.module for node in ast.walk(tree)
+                  if isinstance(node, ast.ImportFrom) and node.module]  # fmt: skip
+        for word in names:
+            path = file.parent.joinpath(*word.split("."))
+            inside = [path.with_name(f"{path.name}.py"), *sorted(path.rglob("*.py"))]
+            for each in (each for each in inside if each.is_file()):
+                place = each.relative_to(file.parent).as_posix()
+                if place not in found and each != file:
+                    found[place] = each
+                    left.append(each)
+    return found
 
 
 def _module(name: str) -> ModuleType:
@@ -108,7 +138,9 @@ def _module(name: str) -> ModuleType:
         return _imported(name)
     package = path.name == "__init__.py"
     word, folder = (path.parent.name, path.parent.parent) if package else (path.stem, path.parent)
-    if not word.isidentifier():
+    while (folder / "__init__.py").is_file():  # a part of a package
+        word, folder = f"{folder.name}.{word}", folder.parent
+    if not all(each.isidentifier() for each in word.split(".")):
         raise InputError(
             f"imports = {show(name)}: {word} is no name of a module: rename the file, with "
             "letters, digits and underscores alone"
@@ -136,21 +168,26 @@ def _imported(word: str, name: str = "") -> ModuleType:
     given = f"imports = {show(name or word)}"
     known = entry_points(group=GROUP)
     target = word if name or word not in known.names else known[word].module
-    if target in sys.modules:
+    if getattr(sys.modules.get(target), "__file__", None) is not None:
         return sys.modules[target]
     try:
         if importlib.util.find_spec(target) is None:
             raise ModuleNotFoundError(name=target)
-    except (ModuleNotFoundError, ValueError):
+    except (ImportError, ValueError):
         hint = f" ({known_or_nearest(word, sorted(known.names))})" if known.names else ""
         raise InputError(
             f"{given}: there is no module {target}, neither beside the file nor installed{hint}"
         ) from None
     try:
-        return importlib.import_module(target)
-    except Exception as error:  # whatever a file of the user's does
+        # What it prints is not what the command prints.
+        with contextlib.redirect_stdout(sys.stderr):
+            found = importlib.import_module(target)
+    except (Exception, SystemExit) as error:  # whatever a file of the user's does
         last = traceback.extract_tb(error.__traceback__)[-1]
         told = " ".join(f"{type(error).__name__}: {error}".split())
         raise InputError(
             f"{given}: it cannot be imported: {told} ({last.filename}, line {last.lineno})"
         ) from error
+    if getattr(found, "__file__", None) is None:
+        raise InputError(f"{given}: it has no file: name a module of your own")
+    return found

@@ -8,6 +8,8 @@ from typing import Any, Literal, Self
 import numpy as np
 
 PLANES = ("upper", "lower")
+OF_CAMPAIGNS = "[outputs] of a campaign file"
+"""What outputs by expressions need: no scene holds it, so that runs alone do not have them."""
 COUNTS = ("steps", "newton_iterations", "jacobians")
 """What a start of a run takes; "total_" before the name counts all starts."""
 TIMINGS = ("wall_time", "cpu_time")

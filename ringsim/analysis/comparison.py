@@ -258,10 +258,11 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             "one of them holds a run and the other a campaign: compare two of the same kind (one "
             "sample of a campaign as a run: ringsim replay FOLDER SAMPLE --save run.nc)"
         )
-    for each in (first, second):
-        known_from(each.attrs)
+    own = [known_from(each.attrs) for each in (first, second)]
+    unlike = [n for n in own[0] if n in own[1] and own[0][n].of != own[1][n].of]
     single = "sample" not in first.dims
-    one, other = (_numbered(each) for each in (first, second))
+    # Outputs of one name that mean two things cannot be compared: ``settings`` tells them.
+    one, other = (_numbered(each.drop_vars(unlike, errors="ignore")) for each in (first, second))
     placed, planned = (placement(one), placement(other)), (one, other)
     notes = {side: losses(each).note for side, each in zip(SIDES, (one, other), strict=True)}
     ran = [int((endings(each) != NOT_RUN).sum()) for each in map(population_of, planned)]
@@ -368,10 +369,11 @@ def settings(both: Both) -> dict[str, Any]:
 
 
 def _asked(campaign: xr.Dataset) -> dict[str, str]:
-    """Distributions and requirements of a campaign in words, by name."""
+    """Distributions, outputs by expressions and requirements of a campaign in words, by name."""
     drawn = (campaign[name] for name in inputs(campaign))
     laws = {f"input {called(each)}": law_text(distribution_of(each)) for each in drawn}
     wanted = required_by(campaign.attrs)
+    laws |= {f"output {name}": each.of for name, each in known_from(campaign.attrs).items()}
     return laws | {
         f"requirement {name}": f"{each.told(name).removeprefix(name).strip()}, probability "
         f"{each.probability:g}, confidence {each.confidence:g}"

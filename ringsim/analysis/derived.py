@@ -6,8 +6,10 @@ The text is read by Python's own parser and never run by Python: what is not lis
 from __future__ import annotations
 
 import ast
+import functools
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
@@ -21,17 +23,22 @@ from ringsim.outputs import COORDINATES, OUTPUTS, VARIABLES, Output
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.tables import unit_text
 from ringsim.units import Model
-from ringsim.variables import Variable
+from ringsim.variables import OF_CAMPAIGNS, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
 
-NEED = "[outputs] of a campaign file"
-"""What a derived output needs: no scene holds it, so that runs alone do not have it."""
 LONGEST = 500
 """Letters of an expression: one for people to read, and too short to exhaust a parser."""
 _LAST = 99
 """Rank among outputs: behind those of ringsim."""
+_OF_FILES = (
+    "sample", "sample_seed", "reason", "log", "overrides", "attempts", "block_row", "statistic",
+    "bound",
+)  # fmt: skip
+"""What campaigns and their analyses hold beside inputs and outputs."""
+_ENDINGS = ("_checked", "_error", "_interval", "_samples")
+"""How names end that files make of those of outputs."""
 _DECLARED: dict[str, type[Output]] = {}
 """Derived outputs by name, each a kind of output that no run computes."""
 
@@ -39,8 +46,18 @@ _DECLARED: dict[str, type[Output]] = {}
 class _Told(NamedTuple):
     """What is known of an expression before it has values."""
 
-    dims: tuple[str, ...]
-    unit: str
+    dims: dict[str, Any]
+    """Dimensions, each with the ends of a range of it, or None for all of it."""
+    unit: dict[str, int]
+    """Exponents of the units of variables, by symbol."""
+
+    @property
+    def symbol(self) -> str:
+        """Its unit in a word, as UDUNITS reads it."""
+        parts = [(f"({s})" if " " in s or "/" in s else s, n) for s, n in self.unit.items()]
+        if len(parts) == 1 and parts[0][1] == 1:
+            return next(iter(self.unit))
+        return " ".join(f"{s}{n if n != 1 else ''}" for s, n in parts) or "1"
 
 
 class Derived(Model):
@@ -49,7 +66,8 @@ class Derived(Model):
     of: Annotated[str, Field(min_length=1, max_length=LONGEST)]
     """Expression over stored variables, for example max(latch_rate)."""
     unit: str | None = None
-    """Its unit; where it is left out, that of the variables."""
+    """Its unit; where it is left out, that of the variables.  Nothing is converted: another one
+    needs a factor in the expression, as max(rod_stress) / 1e6 for MPa."""
     meaning: Annotated[str, Field(max_length=300)] = ""
     """What it is, in words, for tables, figures and reports."""
     worse: Literal["larger", "smaller", "neither"] = "neither"
@@ -76,7 +94,7 @@ class Derived(Model):
 
     def variable(self, name: str) -> Variable:
         """What files and tables say of it."""
-        unit = self.told().unit if self.unit is None else self.unit
+        unit = self.told().symbol if self.unit is None else self.unit
         return Variable(name, (), unit, self.meaning or self.of, worse=self.worse)
 
     def values(self, known: Mapping[str, xr.DataArray]) -> Any:
@@ -94,8 +112,8 @@ def _listed(table: Any) -> Any:
 def _check(outputs: dict[str, Derived]) -> dict[str, Derived]:
     """Refuse what cannot be computed, or means something already; make the rest known."""
     for name, each in outputs.items():
-        known = VARIABLES.keys() - _DECLARED.keys() | COORDINATES.keys() | set(FUNCTIONS)
-        if name in known:
+        known = {*(VARIABLES.keys() - _DECLARED.keys()), *COORDINATES, *FUNCTIONS, *_OF_FILES}
+        if name in known or name.endswith(_ENDINGS):
             raise ValueError(f"{name} means something already: choose another name")
         if not name.isidentifier() or not name.isascii() or name.startswith("_"):
             raise ValueError(
@@ -107,6 +125,14 @@ def _check(outputs: dict[str, Derived]) -> dict[str, Derived]:
             raise ValueError(f"{name}: {error}") from None
         if not each.names:
             raise ValueError(f"{name} = {show(each.of)} has no variable of a run in it")
+        numbers = any(isinstance(node, ast.Constant) and not isinstance(node.value, str)
+                      for node in ast.walk(each.tree))  # fmt: skip
+        if each.unit not in (None, told.symbol) and not numbers:
+            raise ValueError(
+                f"{name}.unit = {show(each.unit)}: its values are in "
+                f"{unit_text(told.symbol) or 'no unit'}: put a factor into the expression, or "
+                "leave unit out"
+            )
         if told.dims:
             raise ValueError(
                 f"{name} = {show(each.of)} has a value for each {' and '.join(told.dims)}: take "
@@ -125,7 +151,7 @@ def declare(outputs: Mapping[str, Derived]) -> None:
     """Make derived outputs known wherever outputs are looked up; the last definition counts."""
     forget(outputs)
     for name, each in outputs.items():
-        content = {"variables": (each.variable(name),), "needs": (NEED,), "rank": _LAST}
+        content = {"variables": (each.variable(name),), "needs": (OF_CAMPAIGNS,), "rank": _LAST}
         _DECLARED[name] = type(f"Derived_{name}", (Output,), content)
 
 
@@ -228,6 +254,8 @@ _REDUCTIONS: dict[str, Callable[[xr.DataArray, list[str]], xr.DataArray]] = {
     "integral": _integral,
 }
 """Functions that take one number of many, over all dimensions or those that ``over`` names."""
+_PAIRED = {"max": np.fmax, "min": np.fmin}
+"""What these do with several expressions: value by value, without those that are missing."""
 _EACH = {"abs": np.abs, "sqrt": np.sqrt}
 FUNCTIONS = (*_REDUCTIONS, *_EACH)
 _ONE_DIM = ("argmax", "argmin", "integral")
@@ -259,7 +287,7 @@ def _number(node: ast.expr) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise _refuse(node, "must be a finite number")
-    return sign * number
+    return float(sign * number)
 
 
 def _tell(node: ast.expr) -> _Told:
@@ -267,26 +295,32 @@ def _tell(node: ast.expr) -> _Told:
     match node:
         case ast.Constant():
             _number(node)
-            return _Told((), "1")
+            return _Told({}, {})
         case ast.Name(id=name):
             return _told_of(name)
         case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=inner):
             return _tell(inner)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
             first, second = _tell(left), _tell(right)
-            return _Told(_both(first, second), _unit(node, first.unit, second.unit))
+            dims = _both(node, first, second)
+            if isinstance(op, ast.Add | ast.Sub):
+                return _Told(dims, _same(node, first, second))
+            sign = -1 if isinstance(op, ast.Div) else 1
+            both = Counter(first.unit)
+            both.update({symbol: sign * n for symbol, n in second.unit.items()})
+            return _Told(dims, {symbol: n for symbol, n in both.items() if n})
         case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARED:
             first, second = _tell(left), _tell(right)
-            if "1" not in (first.unit, second.unit):
-                _same(node, first.unit, second.unit)
-            return _Told(_both(first, second), "1")
+            if first.unit and second.unit:  # a number alone is in the unit of the other
+                _same(node, first, second)
+            return _Told(_both(node, first, second), {})
         case ast.Call(func=ast.Name(id=name)) if name in FUNCTIONS:
             return _told_of_call(node, name)
         case ast.Call(func=ast.Name(id=name), args=[]):
             told = _told_of(name)
             ends = dict(_selection(node, told.dims))
-            kept = (d for d in told.dims if d not in ends or isinstance(ends[d], tuple))
-            return _Told(tuple(kept), told.unit)
+            kept = {d: ends.get(d) for d in told.dims if isinstance(ends.get(d), tuple | None)}
+            return _Told(kept, told.unit)
     raise _refuse(
         node, "is not allowed: an expression has variables, numbers, + - * / < >, parentheses, "
         f"{', '.join(FUNCTIONS)}, and selections such as cable_tension(plane='upper', time=(0, 2))"
@@ -295,39 +329,34 @@ def _tell(node: ast.expr) -> _Told:
 
 def _told_of(name: str) -> _Told:
     known = {n: v for n, v in VARIABLES.items() if v.dtype != "str" and v.flags is None}
-    known = {n: v for n, v in known.items() if NEED not in v.needs}
+    known = {n: v for n, v in known.items() if OF_CAMPAIGNS not in v.needs}
     if name not in known:
         raise InputError(f"{name} is no variable of a run ({known_or_nearest(name, known)})")
-    return _Told(known[name].dims, known[name].units)
+    units = known[name].units
+    return _Told(dict.fromkeys(known[name].dims), {} if units == "1" else {units: 1})
 
 
-def _both(first: _Told, second: _Told) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((*first.dims, *second.dims)))
+def _both(node: ast.expr, first: _Told, second: _Told) -> dict[str, Any]:
+    for dim in first.dims.keys() & second.dims.keys():
+        if first.dims[dim] != second.dims[dim]:
+            raise _refuse(
+                node, f"both sides have another range of {dim}: select the same one, or one place"
+            )
+    return first.dims | second.dims
 
 
-def _same(node: ast.expr, first: str, second: str) -> str:
-    if first != second:
-        a, b = (unit_text(unit) or "a number" for unit in (first, second))
+def _same(node: ast.expr, first: _Told, second: _Told) -> dict[str, int]:
+    if first.unit != second.unit:
+        a, b = (unit_text(each.symbol) or "a number" for each in (first, second))
         raise _refuse(node, f"{a} and {b} cannot be added or compared")
-    return first
-
-
-def _unit(node: ast.BinOp, first: str, second: str) -> str:
-    """Unit of a sum, difference, product or quotient."""
-    if isinstance(node.op, ast.Add | ast.Sub):
-        return _same(node, first, second)
-    if second == "1":
-        return first
-    if isinstance(node.op, ast.Div):
-        return "1" if first == second else f"{first}/{second}"
-    return second if first == "1" else f"{first} {second}"
+    return first.unit
 
 
 def _over(node: ast.Call, told: _Told) -> list[str]:
     """Dimensions that a function reduces."""
     given = {k.arg: k.value for k in node.keywords}
-    if given.keys() - {"over"} or len(node.args) != 1:
-        raise _refuse(node, 'takes one expression, and over="time" or another dimension')
+    if given.keys() - {"over"} or len(node.keywords) > 1:
+        raise _refuse(node, 'takes expressions, and over="time" or another dimension')
     if "over" not in given:
         if "time" in told.dims and ast.unparse(node.func) in _ONE_DIM:
             return ["time"]
@@ -340,58 +369,69 @@ def _over(node: ast.Call, told: _Told) -> list[str]:
 
 
 def _told_of_call(node: ast.Call, name: str) -> _Told:
-    if len(node.args) != 1:
+    if not node.args or (len(node.args) > 1 and (name not in _PAIRED or node.keywords)):
         raise _refuse(node, f"{name} takes one expression")
-    told = _tell(node.args[0])
+    told, *others = map(_tell, node.args)
+    if others:
+        for each in others:
+            told = _Told(_both(node, told, each), _same(node, told, each))
+        return told
     if name in _EACH:
         if node.keywords:
             raise _refuse(node, f"{name} takes one expression and nothing else")
-        return _Told(told.dims, told.unit if name == "abs" else _root(told.unit))
+        if name == "sqrt" and any(n % 2 for n in told.unit.values()):
+            raise _refuse(node, f"{unit_text(told.symbol)} has no root: divide by a unit's value")
+        return _Told(told.dims, told.unit if name == "abs" else
+                     {symbol: n // 2 for symbol, n in told.unit.items()})  # fmt: skip
     if not told.dims:
         raise _refuse(node, "is of one number already: leave the function out")
     dims = _over(node, told)
     if name in _ONE_DIM and (len(dims) != 1 or (name == "integral" and dims != ["time"])):
-        cure = "of what depends on time" if name == "integral" else f'say over="{told.dims[0]}"'
+        first = next(iter(told.dims))
+        cure = "of what depends on time" if name == "integral" else f'say over="{first}"'
         raise _refuse(node, f"{name} is along one dimension: {cure}")
     if name in ("argmax", "argmin"):
         if dims[0] not in COORDINATES or COORDINATES[dims[0]].dtype == "str":
             raise _refuse(node, f"places along {dims[0]} are words: it gives numbers alone")
-        return _Told((), COORDINATES[dims[0]].units)
-    left = tuple(dim for dim in told.dims if dim not in dims)
-    times = "s" if told.unit == "1" else f"{told.unit} s"
-    return _Told(left, times if name == "integral" else told.unit)
+        return _Told({}, {"s": 1} if dims[0] == "time" else {})
+    left = {dim: ends for dim, ends in told.dims.items() if dim not in dims}
+    unit = dict(told.unit)
+    if name == "integral":
+        unit["s"] = unit.get("s", 0) + 1
+    return _Told(left, unit)
 
 
-def _root(unit: str) -> str:
-    half = unit.split(" ")
-    alike = len(half) == 2 and half[0] == half[1]
-    return half[0] if alike else "1" if unit == "1" else f"({unit})^0.5"
-
-
-def _selection(node: ast.Call, dims: tuple[str, ...]) -> list[tuple[str, Any]]:
+def _selection(node: ast.Call, dims: Iterable[str]) -> list[tuple[str, Any]]:
     """Dimension with its value, or both ends of a range."""
-    found: list[tuple[str, Any]] = []
+    found: dict[str, Any] = {}
     for each in node.keywords:
-        if each.arg not in dims:
+        if each.arg is None or each.arg not in dims:
             known = ", ".join(dims) or "no dimensions"
             raise _refuse(node, f"{each.arg} is no dimension of it (it has {known})")
+        if each.arg in found:
+            raise _refuse(node, f"{each.arg} is given twice")
+        text = COORDINATES[each.arg].dtype == "str"
+        word = isinstance(each.value, ast.Constant) and isinstance(each.value.value, str)
+        if text != word:
+            what = "one of its words" if text else "a number, or (from, to)"
+            raise _refuse(node, f"{each.arg} must be {what}")
         if isinstance(each.value, ast.Tuple):
             ends = tuple(_number(end) for end in each.value.elts)
             if len(ends) != 2 or ends[0] > ends[1]:
                 raise _refuse(node, f"{each.arg} = (from, to) needs two numbers, the smaller first")
-            found.append((each.arg, ends))
-        elif isinstance(each.value, ast.Constant) and isinstance(each.value.value, str):
-            found.append((each.arg, each.value.value))
+            found[each.arg] = ends
+        elif isinstance(each.value, ast.Constant) and word:
+            found[each.arg] = each.value.value
         else:
-            found.append((each.arg, _number(each.value)))
-    return found
+            found[each.arg] = _number(each.value)
+    return [*found.items()]
 
 
 def _value(node: ast.expr, known: Mapping[str, xr.DataArray]) -> Any:
     """The values of an expression that ``_tell`` has let pass."""
     match node:
         case ast.Constant():
-            return _number(node)
+            return np.float64(_number(node))  # whose quotient by 0 is no error
         case ast.Name(id=name):
             return known[name]
         case ast.UnaryOp(op=op, operand=inner):
@@ -406,8 +446,13 @@ def _value(node: ast.expr, known: Mapping[str, xr.DataArray]) -> Any:
         case ast.Call(func=ast.Name(id=name)) if name in _EACH:
             return _EACH[name](_value(node.args[0], known))
         case ast.Call(func=ast.Name(id=name)) if name in _REDUCTIONS:
-            values = _value(node.args[0], known)
-            return _REDUCTIONS[name](values, _over(node, _tell(node.args[0])))
+            several = [_value(arg, known) for arg in node.args]
+            if len(several) > 1:
+                return functools.reduce(_PAIRED[name], several)
+            (values,), dims = several, _over(node, _tell(node.args[0]))
+            if not all(values.sizes[dim] for dim in dims):  # a place that this run does not have
+                return values.sum(dims, min_count=1)
+            return _REDUCTIONS[name](values, dims)
         case ast.Call(func=ast.Name(id=name)):
             values = known[name]
             for dim, wanted in _selection(node, VARIABLES[name].dims):
@@ -417,12 +462,17 @@ def _value(node: ast.expr, known: Mapping[str, xr.DataArray]) -> Any:
 
 
 def _selected(values: xr.DataArray, dim: str, wanted: Any) -> xr.DataArray:
-    """The part of an array at a place, between two of them, or at a time between records."""
-    if isinstance(wanted, tuple):
-        along = values[dim]
-        return values.isel({dim: np.flatnonzero((along >= wanted[0]) & (along <= wanted[1]))})
+    """The part of an array at a place, between two of them, or at times between records."""
     if dim == "time":
+        if isinstance(wanted, tuple):
+            along = values[dim].to_numpy()
+            low, high = max(wanted[0], along[0]), min(wanted[1], along[-1])
+            inside = along[(along > low) & (along < high)]
+            wanted = np.unique([low, *inside, high])
         return values.interp(time=wanted)
+    if isinstance(wanted, tuple):
+        places = values[dim].to_numpy()
+        return values.isel({dim: np.flatnonzero((places >= wanted[0]) & (places <= wanted[1]))})
     return values.sel({dim: wanted}, drop=True)
 
 
@@ -438,12 +488,16 @@ def require_places(
                 continue
             for dim, wanted in _selection(node, VARIABLES[node.func.id].dims):
                 places = axes.get(dim)
-                if places is None or dim == "time" or isinstance(wanted, tuple):
+                if places is None:
                     continue
-                if wanted not in places.tolist():
-                    ends = ", ".join(map(str, places.tolist()[:4]))
-                    more = f", ... {places[-1]}" if len(places) > 4 else ""
+                low, high = wanted if isinstance(wanted, tuple) else (wanted, wanted)
+                there = any(low <= place <= high for place in places.tolist())
+                if dim == "time":
+                    there = low <= places[-1] and high >= places[0]
+                if not there:
+                    shown = places.tolist() if len(places) < 6 else [places[0], "...", places[-1]]
+                    given = f"({low}, {high})" if isinstance(wanted, tuple) else show(wanted)
                     raise InputError(
-                        f"{source}: outputs.{name}: {dim} = {show(wanted)} is no {dim} of this "
-                        f"scene ({ends}{more})"
+                        f"{source}: outputs.{name}: {dim} = {given} is no {dim} of this scene "
+                        f"({', '.join(map(str, shown))})"
                     )

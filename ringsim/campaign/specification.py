@@ -1,5 +1,6 @@
 """The campaign file: which scene, which inputs, which design, which limits."""
 
+import contextlib
 import json
 import re
 from collections.abc import Mapping
@@ -36,7 +37,7 @@ from ringsim.sampling.table import (
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
 from ringsim.units import Model
-from ringsim.variables import GONE
+from ringsim.variables import GONE, OF_CAMPAIGNS
 
 SOLVERS = {
     "full": "ringsim.simulation:run",
@@ -316,6 +317,10 @@ def campaign_of(
         text += f"\n# called with --samples {samples}"
     own = extensions.located(extensions.names_in(table), path.parent)
     extensions.load(own)
+    derived.forget(derived.declared())  # of other campaigns
+    if scene is None and isinstance(table.get("scene"), str):
+        with contextlib.suppress(InputError):  # told below; kinds of its modules come first
+            scene = load_scene(table["scene"], beside=path)
     source, learnt = _add_learnt(table, path)
     try:
         specification = Specification.model_validate(table)
@@ -354,7 +359,7 @@ def campaign_of(
     wanted |= {f"requirements.{name}": name for name in specification.requirements}
     wanted |= {f"stop_when.of = {each.of}": each.of for each in specification.stop_when if each.of}
     for where, name in wanted.items():
-        if absent := sorted(set(VARIABLES[name].needs) - has - {derived.NEED}):
+        if absent := sorted(set(VARIABLES[name].needs) - has - {OF_CAMPAIGNS}):
             raise InputError(
                 f"{path.name}: {where}: runs of this scene do not have this output, because the "
                 f"scene has no {absent[0]}: leave it out, or add that to the scene"

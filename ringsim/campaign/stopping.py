@@ -353,6 +353,10 @@ def _copy(
     own: Mapping[str, derived.Derived],
 ) -> None:  # fmt: skip
     """Fill blocks of samples, each read from the journals that hold them."""
+    # What expressions read may be left out of the file; a run of another kind may lack it.
+    read = {n for each in own.values() for n in each.names if n not in wanted}
+    read = {n for n in read if set(VARIABLES[n].dims) <= file.dimensions.keys()}
+    written, wanted = wanted, {**wanted, **{name: VARIABLES[name] for name in read}}
     sizes = {dim: d.size for dim, d in file.dimensions.items()}
     shapes = {n: tuple(sizes[dim] for dim in v.dims) for n, v in wanted.items()}
     bytes_each = sum(8 * int(np.prod(shape, dtype=np.int64)) for shape in shapes.values())
@@ -375,4 +379,5 @@ def _copy(
         axes = {name: file[name][:] for name in file.dimensions if name in file.variables}
         blocks |= _derived(own, blocks, axes)
         for name, values in blocks.items():
-            file[name][start:stop] = values
+            if name in written or name in own:
+                file[name][start:stop] = values

@@ -16,7 +16,7 @@ import xarray as xr
 from click.testing import CliRunner
 from pydantic import ValidationError
 
-from ringsim import InputError, analyse
+from ringsim import InputError, analyse, compare
 from ringsim.analysis import derived
 from ringsim.analysis.derived import FUNCTIONS, Derived, over_samples
 from ringsim.campaign.specification import Campaign, campaign_of
@@ -111,6 +111,14 @@ with np.errstate(all="ignore"):
             np.array([np.sqrt(np.nanmean(a * a)) if np.isfinite(a).any() else np.nan
                       for a in ASYNC]),
         "-(+peak_tension)": -A["peak_tension"],
+        "max(max(asynchrony), min(asynchrony))":
+            np.nan_to_num(ASYNC).max(1),
+        "integral(asynchrony(time=(0.25, 0.55)))": 0.05 * (
+            0.5 * (0.5 * (ASYNC[:, 2] + ASYNC[:, 3]) + ASYNC[:, 3])
+            + (ASYNC[:, 3] + ASYNC[:, 4]) + (ASYNC[:, 4] + ASYNC[:, 5])
+            + 0.5 * (ASYNC[:, 5] + 0.5 * (ASYNC[:, 5] + ASYNC[:, 6]))),
+        "peak_tension / (0 * peak_tension)": np.full(4, np.nan),
+        "1 / 0 + locked_joints": np.full(4, np.nan),
         "locked_joints / 2": np.array([3.0, 2.5, np.nan, 0.0]),
     }  # fmt: skip
 
@@ -131,13 +139,21 @@ def test_values_are_those_of_numpy(text: str) -> None:
     ("text", "unit"),
     [("max(cable_tension)", "N"), ("argmax(asynchrony)", "s"), ("max(lock_time) * 2", "s"),
      ("integral(cable_tension(plane='upper', span=1))", "N s"), ("locked_joints", "1"),
-     ("peak_tension / deployment_time", "N/s"), ("max(latch_rate) / peak_latch_rate", "1"),
+     ("peak_tension / deployment_time", "N s-1"), ("max(latch_rate) / peak_latch_rate", "1"),
      ("argmax(lock_time, over='section')", "1"), ("sqrt(peak_tension * peak_tension)", "N"),
      ("integral(asynchrony > 10)", "s")],
 )  # fmt: skip
 def test_units_follow_from_those_of_the_variables(text: str, unit: str) -> None:
     assert Derived(of=text).variable("x").units == unit
-    assert Derived(of=text, unit="furlong").variable("x").units == "furlong"
+
+
+@pytest.mark.quick
+def test_another_unit_takes_a_factor() -> None:
+    """Nothing is converted."""
+    with pytest.raises(InputError, match="put a factor into the expression"):
+        of('x = { of = "peak_tension", unit = "kN" }')
+    each = of('x = { of = "peak_tension / 1000", unit = "kN" }').specification.outputs["x"]
+    assert each.variable("x").units == "kN"
 
 
 @pytest.mark.quick
@@ -176,6 +192,15 @@ def test_units_follow_from_those_of_the_variables(text: str, unit: str) -> None:
         ("(" * 230 + "peak_tension" + ")" * 230, "is no expression"),
         ("-" * 480 + "locked_joints", ""),
         ("max(cable_tension)" * 40, "at most 500"),
+        ("max(asynchrony(time=(5, 6)))", "time = (5.0, 6.0) is no time of this scene"),
+        ("max(opening_angle(section=(9, 10)))", "is no section of this scene"),
+        ("max(cable_tension(plane=(0, 1)))", "plane must be one of its words"),
+        ("max(asynchrony(time='x'))", "time must be a number, or (from, to)"),
+        ("max(asynchrony(time=0.1, time=0.2))", "time is given twice"),
+        ("max(lock_time(section=(1, 1)) - lock_time(section=(2, 2)))", "another range of section"),
+        ("max(peak_tension, deployment_time)", "cannot be added or compared"),
+        ("sqrt(peak_tension)", "has no root"),
+        ("peak_tension / (deployment_time / 1 - peak_tension / 1)", "cannot be added"),
         ("peak_tension\0", "is no expression"),
     ],
 )  # fmt: skip
@@ -270,7 +295,11 @@ apart = "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize("name", ["peak_tension", "section", "max", "_own", "a b", "lück"])
+@pytest.mark.parametrize(
+    "name",
+    ["peak_tension", "section", "max", "_own", "a b", "lück", "sample", "log", "overrides",
+     "x_checked"],
+)  # fmt: skip
 def test_names_that_mean_something_are_refused(name: str) -> None:
     with pytest.raises(InputError, match="outputs"):
         of(f"{json.dumps(name)} = 'peak_tension'")
@@ -284,3 +313,25 @@ def test_a_plan_tells_that_records_miss_short_peaks(tmp_path: Path) -> None:
     assert "reads records every 0.05 s" in done.output
     bad = CliRunner().invoke(cli, ["analyse", str(tmp_path / "o")])
     assert bad.exit_code == EXIT_BAD_INPUT
+
+
+def test_what_expressions_read_may_be_left_out_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And campaigns that mean two things by one name are not compared by it."""
+    monkeypatch.chdir(tmp_path)
+    found = []
+    for sense in ("max", "min"):
+        text = FILE.format(outputs=f'pull = "{sense}(cable_tension)"', more="").replace(
+            'name = "own"', f'name = "{sense}"\noutput = {{ leave_out = ["cable_tension"] }}'
+        )
+        Path("own.toml").write_text(text, encoding="utf-8")
+        done = CliRunner().invoke(cli, ["campaign", "own.toml", "--workers=0"])
+        assert done.exit_code == EXIT_DONE, done.output
+        found.append(xr.load_dataset(f"runs/{sense}/campaign.nc"))
+        assert "cable_tension" not in found[-1]
+    assert (found[0]["pull"] > found[1]["pull"]).all()
+    told = compare(*found)
+    assert "pull_difference" not in told
+    assert "output pull" in told["setting"].values
+    assert "pull_difference" in compare(found[0], found[0])

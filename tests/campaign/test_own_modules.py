@@ -165,6 +165,9 @@ def test_own_kinds_run_everywhere(study: Path, tmp_path: Path) -> None:
         ("failing_here", "\n1 / 0\n", "ZeroDivisionError: division by zero"),
         ("not-a-name.py", "", "is no name of a module"),
         ("json", "", "another module of this name is in use"),
+        ("leaving_here", "raise SystemExit(3)\n", "SystemExit: 3"),
+        ("..", None, "must be the name of a module"),
+        ("sys", None, "it has no file"),
         ("twice_here", TWICE, "there is an output asynchrony already"),
     ],
 )  # fmt: skip
@@ -235,3 +238,30 @@ def test_a_campaign_in_python_imports_and_derives(
     assert found.attrs["modules"]
     assert str(tmp_path / "empty_here.py") in found.attrs["scene"]
     derived.forget(derived.declared())
+
+
+def test_what_a_module_imports_beside_it_counts_and_what_it_prints_is_no_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also a part of a package beside the file."""
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "chatty_here.py").write_text("import helper_here\nprint('hello')\n", "utf-8")
+    helper = tmp_path / "helper_here.py"
+    helper.write_text("VALUE = 1\n", encoding="utf-8")
+    package = tmp_path / "package_here"
+    package.mkdir()
+    (package / "__init__.py").write_text("", encoding="utf-8")
+    (package / "values.py").write_text("VALUE = 2\n", encoding="utf-8")
+    (package / "laws.py").write_text("from .values import VALUE\n", encoding="utf-8")
+    names = extensions.located(["chatty_here", "package_here.laws"], tmp_path)
+    extensions.load(names)
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err) == ("", "hello\n")
+    assert sys.modules["package_here.laws"].VALUE == 2
+    assert extensions.digest(names)
+    for file in (helper, package / "values.py"):
+        text = file.read_text(encoding="utf-8")
+        file.write_text("VALUE = 3\n", encoding="utf-8")
+        with pytest.raises(InputError, match="has changed since it was loaded"):
+            extensions.digest(names)
+        file.write_text(text, encoding="utf-8")

@@ -24,6 +24,7 @@ from ringsim.outputs.balance import instead_of
 from ringsim.refusal import known_or_nearest
 from ringsim.sampling.designs.family import Design, Factors
 from ringsim.sampling.distributions import Array, inside
+from ringsim.variables import OF_CAMPAIGNS
 
 # Levels.
 
@@ -243,7 +244,10 @@ class SubsetSimulation(Design):
 
     @model_validator(mode="after")
     def _consistent(self) -> "SubsetSimulation":
-        known = [n for n, v in VARIABLES.items() if not v.dims and v.dtype == "f8"]
+        known = [
+            n for n, v in VARIABLES.items()
+            if not v.dims and v.dtype == "f8" and OF_CAMPAIGNS not in v.needs  # known at the merge
+        ]  # fmt: skip
         if self.of in VARIABLES and VARIABLES[self.of].dims:
             sense = "largest" if self.below is None else "least"
             raise ValueError(f"of = {instead_of(self.of, sense)}")
