@@ -394,12 +394,12 @@ def _numbered(dataset: xr.Dataset) -> xr.Dataset:
 
 def samples_of(first: xr.Dataset, second: xr.Dataset) -> tuple[Both, Pairs]:
     """The samples of two campaigns that are compared, and how: those of pairs where there are any,
-    else all; of either those that have run and stand for the population.
+    else all; of either those that have run, if any has, and stand for the population.
     """
-    ran = [
-        each.isel(sample=np.flatnonzero(endings(each) != NOT_RUN))
-        for each in (population_of(first), population_of(second))
-    ]
+    ran = []
+    for each in (population_of(first), population_of(second)):
+        over = np.flatnonzero(endings(each) != NOT_RUN)
+        ran.append(each.isel(sample=over) if len(over) else each)
     pairs = paired(ran[0], ran[1])
     if not len(pairs.first):
         return (ran[0], ran[1]), pairs

@@ -249,7 +249,7 @@ def _lines_of(both: Both) -> list[int | None]:
         return [_line_of(each) for each in both]
     first = _line_of(both[0].isel(sample=pairs.first[held]))
     places = pairs.second[both[0]["sample"].to_numpy()[pairs.first] == first]
-    return [first, *both[1]["sample"].to_numpy()[places].tolist()]
+    return [first, int(both[1]["sample"].to_numpy()[places][0])]
 
 
 def _line_of(campaign: xr.Dataset) -> int | None:
@@ -315,6 +315,8 @@ def _course(
     held, kept = np.concatenate(parts), np.concatenate(samples)
     rows = np.full((3, len(at)), np.nan)
     known = np.isfinite(held).any(axis=0)
+    if not known.any():  # all runs have failed
+        return time[at], rows
     rows[0, known], rows[2, known] = np.nanmin(held[:, known], 0), np.nanmax(held[:, known], 0)
     if (own := held[kept == line]).size:
         rows[1] = own[0]

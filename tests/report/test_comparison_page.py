@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from loops import for_each
 from made_campaign import TIMES, made_campaign, made_scene
 
 from read_page import Page
@@ -298,6 +299,14 @@ def test_all_tables_and_figures_are_of_the_pairs_that_have_run() -> None:
     assert set(titles) == {"n = 4 of 4, 4 of 4"}
     legend = [text.get_text() for text in drawn["courses"].legends[0].get_texts()]
     assert len({text.partition("line: ")[2] for text in legend}) == 1
+
+
+@for_each("less", ["failed", "not_run"])
+def test_a_campaign_without_a_result_is_compared(less: str) -> None:
+    one, other = made_campaign(4), made_campaign(4, **{less: (0, 1, 2, 3)})
+    found = compare(one, other)
+    assert "deployment_time &lt;= 40 s: met" in comparison_page(found, one, other)
+    assert ("second: 0 of 4 samples have run" in compared(found)) == (less == "not_run")
 
 
 def test_numbers_that_runs_call_uncertain_are_marked_and_counted(

@@ -560,8 +560,8 @@ def test_printed_figures_fill_their_sheets() -> None:
         heights = [min(scale, 7.17 / sizes[k][0]) * sizes[k][1] + 0.385 for k in own]
         assert 0.57 <= scale <= 0.85
         assert len(own) == 1 or sum(heights) < 10.59 - 0.4  # of a heading
-    assert [own for _, own in made] == [[0, 1], [2], [3, 4], [5]]
-    assert made[2][0] > 0.7  # two small ones are drawn larger
+    assert [own for _, own in made] == [[0, 1], [2, 3], [4], [5]]
+    assert made[2][0] == 0.85  # what is alone is drawn larger
 
 
 def test_long_heads_may_be_broken_at_underscores() -> None:
