@@ -27,7 +27,7 @@ from ringsim.analysis.intervals import Mask, good, lost, ran, used, worst_sample
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
-from ringsim.outputs.base import may_be_off
+from ringsim.outputs.base import DOUBT, may_be_off
 from ringsim.tables import Table, chance_text, counted, known_to, readable, with_unit
 from ringsim.variables import Variable
 
@@ -280,8 +280,6 @@ def marked(table: Table, analysis: xr.Dataset, column: int = 0) -> Table:
 # Outputs that runs call uncertain themselves, and the mark on them.
 
 
-DOUBT = " ?"
-"""Stands behind what may be off."""
 DOUBTED = f"{DOUBT.strip()} may be off, since steps are too long for the shocks of locks"
 """What is said below a table with that mark."""
 OFF = "may_be_off"

@@ -26,6 +26,7 @@ from ringsim.cli.options import (
 from ringsim.files import require_file
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import summary
+from ringsim.outputs.base import DOUBT, may_be_off
 from ringsim.parts.solver import Solver
 from ringsim.refusal import EXIT_DONE, EXIT_FAILED, InputError
 from ringsim.scene import Scene, load_scene
@@ -171,8 +172,9 @@ def run_command(
         click.echo(f"{chosen.name}{engine}: {outcome.status.word}{became}: {outcome.reason}")
         if anew := _restarted(values, chosen.solver):
             click.echo(f"  {anew}")
+        off, _ = may_be_off(outcome.reason)
         for name, told in summary(outcome.coordinates | values, chosen.span_names).items():
-            label = (VARIABLES[name].summary or ("",))[0]
+            label = (VARIABLES[name].summary or ("",))[0] + DOUBT * (name in off)
             if anew or name != "total_steps":
                 click.echo(f"  {label:20s}{told}")
         for told in below_limits(chosen, values):

@@ -163,6 +163,10 @@ def may_be_off(reason: str) -> tuple[list[str], str]:
     return (found[1].split(", "), found[2]) if found else ([], "")
 
 
+DOUBT = " ?"
+"""Stands behind what may be off, wherever it is told."""
+
+
 _DOUBTFUL = 2.5
 """Factor between a rate and the least that a latch asks for, within which a lock may decide."""
 

@@ -9,6 +9,7 @@ import pytest
 import scipy
 import xarray as xr
 from made_campaign import made_campaign
+from matplotlib.text import Text
 
 from ringsim.analysis.campaign_notes import late_line, peak_lines, remark_lines
 from ringsim.analysis.study import analyse
@@ -16,6 +17,7 @@ from ringsim.analysis.study_text import not_met
 from ringsim.analysis.study_text import told as all_told
 from ringsim.analysis.verdicts import verdict_table
 from ringsim.analysis.worst import margin_table
+from ringsim.plots.figures import figures_of
 
 pytestmark = pytest.mark.quick
 
@@ -140,3 +142,17 @@ def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> Non
     assert not remark_lines(made)
     made["reason"] = "sample", np.array([REACHED] * 4, dtype=object)
     assert late_line(made) == ""
+
+
+def test_figures_mark_the_panels_of_what_may_be_off() -> None:
+    """In the caption, too; nothing of that where runs doubt nothing."""
+    for names in ({}, dict.fromkeys(range(3), "peak_tension")):
+        made = with_doubts(made_campaign(8), names)
+        drawn = {picture.name: figure for picture, figure in figures_of(made)}
+        figure = drawn["distributions"]
+        labels = [axes.get_xlabel() for axes in figure.axes]
+        assert [each for each in labels if each.endswith(" ?")] == [
+            each for each in labels if names and "tension" in each
+        ]
+        texts = " ".join(" ".join(each.get_text().split()) for each in figure.findobj(Text))
+        assert ("peak_tension in 3 of 8 samples" in texts) == bool(names)

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from ringsim.cli import cli
+from ringsim.outputs import VARIABLES
 from ringsim.outputs.base import slowest_period, unresolved
 from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
@@ -120,3 +124,13 @@ def test_the_tolerance_that_is_told_is_enough(name: str, sections: int) -> None:
 def test_a_lock_in_the_last_step_counts_that_step() -> None:
     last = run(0.2, lock=1.999, reactions=True)
     assert "too long for shocks" in unresolved(last, {"peak_base_force": 1.9995})
+
+
+def test_the_summary_of_a_run_marks_them(tmp_path: Path) -> None:
+    """All that the reason names, and nothing else."""
+    values = ("structure.sections=4", "record.reactions=true", "stop.latch=true")
+    words = ["run", "ring18-cable", "--fidelity=frame", f"--out={tmp_path / 'one.nc'}"]
+    text = CliRunner().invoke(cli, [*words, *(f"--set={each}" for each in values)]).output
+    (named,) = re.findall(r", so (.*) may be off", text)
+    labels = {VARIABLES[name].summary[0] for name in named.split(", ")}
+    assert set(re.findall(r"^  (\S.*?) \? ", text, re.MULTILINE)) == labels

@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_notes import (
-    DOUBT,
     MARK,
     NOTE,
     attributes,
@@ -44,6 +43,7 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import one_at_a_time
+from ringsim.outputs.base import DOUBT
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
 from ringsim.tables import Table
