@@ -220,7 +220,7 @@ def optimise_command(
     that were tried are campaigns in the same folder.  The same command goes on with one that was
     interrupted; under mpiexec or srun every rank computes, and --workers is left out.
     """
-    from ringsim.analysis.optimum import front_tables
+    from ringsim.analysis.front import front_tables
     from ringsim.campaign.optimisation import Given, optimisation_of, run_optimisation
 
     def given() -> Given:

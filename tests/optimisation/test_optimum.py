@@ -74,7 +74,7 @@ def test_chance_constraint_is_met_and_costs_little_more_than_it_must():
     for seed in range(20):
         found, runs = solved(problem({"y": WANTED}), gaussian(seed))
         [chosen] = found.chosen
-        one, two = chosen.point
+        one, two = found.points[chosen.place]
         probability = scipy.special.ndtr((1.5 - one - 2.0 * two) / (0.1 * (1.0 + one)))
         met += probability >= WANTED.probability
         costs.append((one - 0.9) ** 2 + (two - 0.8) ** 2)
@@ -91,7 +91,7 @@ def test_quantile_that_no_normal_law_has_is_found_by_checking():
     wanted, met = Requirement(max=1.5, probability=0.95, confidence=0.9), 0
     for seed in range(6):
         found, _ = solved(problem({"y": wanted}), gaussian(seed, skewed=True))
-        one, two = found.chosen[0].point
+        one, two = found.points[found.chosen[0].place]
         edge = 2.16 * (1.5 - one - 2.0 * two) / (0.1 * (1.0 + one)) + np.exp(0.5)
         met += scipy.special.ndtr(np.log(edge)) >= 0.95
     assert met >= 5
@@ -107,7 +107,7 @@ def test_front_of_two_objectives_is_that_of_the_closed_form():
 
     wide = Problem([Objective("f1"), Objective("f2")], {}, np.array([0.4, 0.6]), 150, 100, 5)
     found, _ = solved(wide, values)
-    each = np.array([chosen.search.objectives for chosen in found.chosen])
+    each = np.array([found.judged[chosen.place].objectives for chosen in found.chosen])
     assert len(each) == 5
     np.testing.assert_allclose(np.sqrt(np.maximum(each, 0.0)).sum(axis=1), 1.0, atol=0.03)
     np.testing.assert_allclose(np.sort(each[:, 1]), [0.0, 0.25, 0.5, 0.75, 1.0], atol=0.05)
@@ -120,15 +120,15 @@ def test_designs_whose_runs_fail_are_passed_over():
 
     found, _ = solved(problem({}), values)
     [chosen] = found.chosen
-    assert chosen.search.lost == 0.0
-    assert 0.5 < chosen.point[0] <= 0.6
+    assert found.judged[chosen.place].lost == 0.0
+    assert 0.5 < found.points[chosen.place][0] <= 0.6
 
 
 def test_what_a_variable_buys_is_the_design_with_its_present_value():
     found, _ = solved(problem({"y": WANTED}), gaussian(1))
     [chosen] = found.chosen
     for k, one in enumerate(chosen.without):
-        point = chosen.point.copy()
+        point = found.points[chosen.place].copy()
         point[k] = 0.3
         cost = (point[0] - 0.9) ** 2 + (point[1] - 0.8) ** 2
         assert one.objectives[0] == pytest.approx(cost)
