@@ -45,10 +45,12 @@ def write_front(
         "output": len(outputs_of(problem)),
     }  # fmt: skip
 
-    def shown(ones: Sequence[Judged], more: Array | float = 0.0) -> Array:
+    def shown_of(steered: Array) -> Array:
         """Objectives as they are told, shape (designs, objectives)."""
-        steered = np.array([one.objectives for one in ones]).reshape(-1, len(aims)) + more
         return np.column_stack([aim.shown(steered[:, k]) for k, aim in enumerate(aims)])
+
+    def shown(ones: Sequence[Judged], more: Array | float = 0.0) -> Array:
+        return shown_of(np.array([one.objectives for one in ones]).reshape(-1, len(aims)) + more)
 
     def beyond(ones: Sequence[Judged]) -> Array:
         return np.array([one.beyond for one in ones]).reshape(-1, len(bounds))
@@ -74,6 +76,10 @@ def write_front(
                          f"{aimed_at}, by the few samples of the search"),
         "tried_lost": (("tried",), [one.lost for one in found.judged],
                        "share of these samples without a value"),
+        "tried_estimate": (("tried", "objective"), shown_of(found.corrected[:, : len(aims)]),
+                           "the same statistic, corrected by the checks of designs nearby"),
+        "tried_estimate_beyond": (("tried", "bound"), found.corrected[:, len(aims) :],
+                                  f"{aimed_at}, likewise"),
         "tried_check_objective": (("tried", "objective"), shown(checks),
                                   "statistic by the check samples; NaN without a check"),
         "tried_check_beyond": (("tried", "bound"), beyond(checks), f"{aimed_at}, likewise"),
@@ -102,6 +108,8 @@ def write_front(
                          "share of the few samples without a value, likewise"),
         "objective_sign": (("objective",), [aim.sign for aim in aims],
                            "1 if small values are wanted, -1 if large ones are"),
+        "confidence": (("requirement",), [r.confidence for r in problem.requirements.values()],
+                       "confidence of each lower bound of a probability"),
         "low": (("variable",), [axis.low for axis in axes], "least value"),
         "high": (("variable",), [axis.high for axis in axes], "largest value"),
     }  # fmt: skip
@@ -180,16 +188,17 @@ def _designs(found: "xr.Dataset") -> Table:
         factor, told = readable(units, float(np.nanmax(np.abs(middle), initial=0.0)))
         unit = f" ({unit_text(told)})" if unit_text(told) else ""
         rows.append((f"{objective}{unit}", *(number_text(factor * v, 4) for v in middle)))
-        rows.append(("  95 %", *(
+        rows.append(("95 %", *(
             interval_text(factor * a, factor * b) for a, b in zip(low, high, strict=True)
         )))  # fmt: skip
     for k, words in enumerate(found["requirement_text"].values):
         share, least = (found[f"probability{end}"].values[:, k] for end in ("", "_lower"))
         rows.append((f"{words}: share that meets it", *(number_text(v, 4) for v in share)))
-        rows.append(("  at least", *(number_text(v, 4) for v in least)))
+        sure = f"at least, with confidence {float(found['confidence'].values[k]):g}"
+        rows.append((sure, *(number_text(v, 4) for v in least)))
         name = found["requirement"].values[k]
         verdict = (Verdict(int(v)).words for v in found["verdict"].values[:, k])
-        rows.append((f"  verdict on {name}", *verdict))
+        rows.append((f"verdict on {name}", *verdict))
     both = found["compared"].values
     for k, name in enumerate(found["output"].values if both.any() else ()):
         values, unit = _in_units(
@@ -287,12 +296,13 @@ def _bought(found: "xr.Dataset") -> list[Table]:
                     itself = f" ({name} itself by {_amount(mine, units)})" if mine > 0.0 else ""
                     broken.append(f"{bound} by {_amount(far, units)}{itself}")
             rows.append((str(variable), *cells, ", ".join(broken) or "-"))
+        last = k == found.sizes["design"] - 1
         changes = (f"change of {each}" for each in found["objective"].values)
         notes = [
             f"by the {counted(int(found.attrs['samples']), 'sample')} of the search, the same in "
             "all designs, and what the check of the design has corrected; beyond: of the quantile "
             "that is aimed at, so that the verdict can show the one required"
-        ]
+        ] * last
         head = f"{name} with the present", *changes, "is then beyond"
         tables.append(Table(head, rows, notes))
     return tables

@@ -6,20 +6,19 @@ numbers), so that f and g are nearly smooth functions of x:
 
     min f_1(x)   subject to   f_2(x) <= level,   g(x) <= 0
 
-first by COBYQA, which needs no derivatives and interpolates f and g by quadratics in a trust region
-(Ragonneau, thesis, Hong Kong 2022; in scipy), then by steps to the best place near the best known
-design on smooth surfaces through all that is known (cubic radial functions: Regis, Eng. Optim. 46
-(2014) 218).  Several levels give the front of two objectives (Haimes, Lasdon and Wismer, IEEE
-Trans. SMC-1, 1971).  That P(y <= b) >= p is steered by
+first by COBYQA, which interpolates f and g by quadratics in a trust region (Ragonneau, thesis, Hong
+Kong 2022; in scipy), then by steps to the best place near the best known design on smooth surfaces
+through all that is known (cubic radial functions: Regis, Eng. Optim. 46 (2014) 218).  Several
+levels give the front of two objectives (Haimes, Lasdon and Wismer, IEEE Trans. SMC-1, 1971).  That
+P(y <= b) >= p is steered by
 
     g(x) = mean(y) + z_a sd(y) - b
 
 with a beyond p by as much as it takes to show p by the samples of the verdict.  What few samples
-and a normal law get wrong is the shift s, by which the statistics of many fresh samples of a design
-differ from those of its few (Du and Chen, J. Mech. Design 126 (2004) 225).  It corrects f and g;
-between designs that were checked it is interpolated.  A round checks the best design and searches
-on, until the check says what was foretold, or all designs are used.  Verdicts are told by samples
-that have chosen nothing.
+and a normal law get wrong is the shift, by which statistics of many fresh samples of a design
+differ from those of its few (Du and Chen, J. Mech. Design 126 (2004) 225).  Interpolated between
+designs that were checked, it corrects f and g.  A round checks the best design and searches on,
+until a check says what was foretold.  Verdicts are told by samples that have chosen nothing.
 """
 
 import queue
@@ -268,6 +267,8 @@ class Found:
     judged: list[Judged] = field(default_factory=list)
     checks: dict[int, Judged] = field(default_factory=dict)
     """What many samples say, by the place of a design; the present one is the first."""
+    corrected: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    """Statistics of all designs by few samples and the shift, shape (designs, parts)."""
     searched: int = 0
     """The first of them, which the search has tried; others show what variables buy."""
     chosen: list[Chosen] = field(default_factory=list)
@@ -298,13 +299,9 @@ class _Search:
             raise asked
         return None if asked is None else np.asarray(asked)
 
-    def tell(self, value: float, beyond: Array) -> None:
-        """What it wants to make small there, and what shall be at most 0."""
-        self._told.put((value, beyond))
-
-    def stop(self) -> None:
-        """Let the thread end."""
-        self._told.put(None)
+    def tell(self, told: tuple[float, Array] | None) -> None:
+        """What it wants to make small there, and what shall be at most 0; None lets it end."""
+        self._told.put(told)
 
     def _at(self, point: Array) -> tuple[float, Array]:
         point = np.asarray(np.round(np.clip(point, 0.0, 1.0), DIGITS), dtype=np.float64)
@@ -357,24 +354,23 @@ class _Archive:
 
     def check(self, place: int) -> Generator[Wanted, Values, bool]:
         """See what many samples say of a design: whether it is what was foretold."""
-        foretold = self._estimates()[1][place]
-        wanted = Wanted(CHECK, self.found.points[place], self._best_so_far())
-        told = judged(self.problem, (yield wanted), many=True)
-        self.found.checks[place] = told
+        foretold = self.estimates()[1][place]
+        values = yield Wanted(CHECK, self.found.points[place], self._best_so_far())
+        told = self.found.checks[place] = judged(self.problem, values, many=True)
         return bool((np.abs(told.parts - foretold) <= told.errors + _TINY).all())
 
     def _best_so_far(self) -> Array | None:
         if not self.found.points:
             return None
-        return np.asarray(self._estimates()[1][self.best(0), : len(self.problem.objectives)])
+        return np.asarray(self.estimates()[1][self.best(0), : len(self.problem.objectives)])
 
     def _scale(self, first: Judged) -> None:
-        sizes = [abs(bound) for _, _, bound, _ in self.problem.bounds]
-        beyond = np.maximum(np.abs(first.beyond), np.array(sizes, dtype=np.float64))
-        own = np.concatenate([np.abs(first.objectives), beyond])
+        sizes = np.zeros(len(first.parts))
+        sizes[len(first.objectives) :] = [abs(bound) for _, _, bound, _ in self.problem.bounds]
+        own = np.fmax(np.abs(first.parts), sizes)
         self.scales = np.array(np.where(np.isfinite(own) & (own > _TINY), own, 1.0), np.float64)
 
-    def _estimates(self) -> tuple[Array, Array]:
+    def estimates(self) -> tuple[Array, Array]:
         """Of each design the share of lost samples, shape (designs,), and its statistics: of few
         samples, and the shift of the checked ones, of each the more the nearer it is.
         """
@@ -410,7 +406,7 @@ class _Archive:
         """Of each design what a search makes small, and what shall be at most 0, without units;
         share of lost samples beyond the least known is among it.
         """
-        lost, parts = self._estimates()
+        lost, parts = self.estimates()
         value, beyond = self._split(parts, which, level)
         scale, scales = self._scales(which, level)
         every = np.column_stack([value / scale, beyond / scales])
@@ -519,8 +515,11 @@ def course(problem: Problem) -> Course:
         yield from _rounds(archive, which, np.inf, later)
     levels = [np.inf]
     if len(problem.objectives) > 1:
-        first, last = (found.checks[archive.choice(k)].objectives[1] for k in (0, 1))
-        levels = np.linspace(first, last, problem.front).tolist()
+        ends = np.array([found.checks[archive.choice(k)].objectives[1] for k in (0, 1)])
+        # Scores of probabilities: what lies farther out cannot be told apart.
+        far = 3.0 if problem.objectives[1].statistic == "probability" else np.inf
+        near = np.linspace(*np.clip(ends, -far, far).tolist(), problem.front).tolist()
+        levels = [float(ends[0]), *near[1:-1], float(ends[1])]
     for level in levels[1:-1]:
         yield from _rounds(archive, 0, level, each)
     places = list(dict.fromkeys(archive.choice(0, level) for level in levels))
@@ -531,6 +530,7 @@ def course(problem: Problem) -> Course:
             point = found.points[chosen.place].copy()
             point[k] = value
             chosen.without.append(found.judged[(yield from archive.at(point))])
+    found.corrected = archive.estimates()[1]
     return found
 
 
@@ -541,9 +541,9 @@ def _search(archive: _Archive, designs: int, which: int) -> Generator[Wanted, Va
         while (point := search.next()) is not None:
             place = yield from archive.at(point)
             value, beyond = archive.told(which, np.inf)
-            search.tell(float(value[place]), beyond[place])
+            search.tell((float(value[place]), beyond[place]))
     finally:
-        search.stop()
+        search.tell(None)
 
 
 def _rounds(

@@ -100,10 +100,14 @@ class Given:
     @property
     def asked(self) -> str:
         """All that decides about what is run, as a text."""
-        wanted = self.present.specification
-        table = self.budget.model_dump(mode="json", by_alias=True, exclude_none=True)
-        left = {"name", "title", "question", "set", "scene", "design", "requirements"}
-        table |= wanted.model_dump(mode="json", exclude=left, exclude_none=True)
+        wanted, keys = self.present.specification, {"exclude_none": True, "mode": "json"}
+        left = {"name", "title", "question", "seed", "set", "scene", "design", "requirements"}
+        table = {"seed": self.table.get("seed", 0)}
+        table |= self.budget.model_dump(by_alias=True, exclude={"objectives"}, **keys)
+        table |= wanted.model_dump(exclude=left, **keys)
+        table["objectives"] = {
+            name: aim.model_dump(exclude_unset=True) for name, aim in self.budget.objectives.items()
+        }
         table["scene"] = self.present.scene.to_table()
         return tomli_w.dumps(table)
 
