@@ -1,8 +1,10 @@
 """One page about a campaign, out of its merged file, or about how it differs from another."""
 
 import re
+import shlex
 import tomllib
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,10 +14,13 @@ import xarray as xr
 from ringsim.analysis import comparison_text
 from ringsim.analysis.campaign_notes import override_lines, peak_lines, restart_lines
 from ringsim.analysis.design import (
+    LOST,
     NOT_RUN,
     REACHED,
     UNKNOWN,
+    called,
     campaign_file,
+    distribution_of,
     endings,
     inputs,
     paths_of,
@@ -24,7 +29,7 @@ from ringsim.analysis.intervals import good
 from ringsim.analysis.residuals import residual_table, residuals
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import Section, head_lines, outputs_in, sections
-from ringsim.analysis.worst import note_on_unusual, worst_tables
+from ringsim.analysis.worst import first_clause, note_on_unusual, worst_tables
 from ringsim.files import write_text
 from ringsim.measured import Measurement
 from ringsim.overrides import flat
@@ -32,10 +37,12 @@ from ringsim.plots import style
 from ringsim.plots.comparison import figures_of_both, measured_and_computed
 from ringsim.plots.figures import figures_of
 from ringsim.refusal import show
-from ringsim.report import tables
 from ringsim.report.player import player
 from ringsim.report.shell import written
+from ringsim.sampling.distributions import law_text
 from ringsim.scene import builtin_scenes
+from ringsim.tables import number_text, unit_text
+from ringsim.variables import Cause
 
 # The model of a campaign: every value of its scene, and where it comes from.
 
@@ -124,6 +131,97 @@ _MATTERS = "tornado"
 _FIRST = 3
 
 
+# What it tells of the campaign beside its analysis: plain rows of text.
+
+
+MOST_FAILURES = 100
+"""Rows of the table of failures; the page says how many more there are."""
+_SHOWN = ("title", "source", "execution", "seed", "solver", "identity", "date_created")
+_PLACES = re.compile(
+    r" and \d+ more|(?:(?:upper|lower) )?\d[\d.e+-]*(?:, )?|samples?|latches|latch"
+)
+"""What differs between antennas that ended alike: V-joints by name, numbers, and plurals."""
+_MOST_NAMED = 20
+"""Samples of a row that are named."""
+Rows = list[list[str]]
+
+
+def failures(
+    campaign: xr.Dataset, folder: str, told: Mapping[int, Sequence[str]] | None = None
+) -> tuple[Rows, int]:  # fmt: skip
+    """Samples, ending with its cause, reason, command that repeats the first; how many rows are
+    left out.
+
+    Runs that lost their numbers, and sound ones in which the antenna fell short of its goal; a row
+    for all that ended in the same way.  Antennas end in the same way that differ by places and
+    numbers: the row has the words of the first.  No row of samples without a cause of which all it
+    is ``told`` by sample why they ended.
+    """
+    told = {} if told is None else told
+    words, goals = endings(campaign), (*REACHED, UNKNOWN, NOT_RUN)
+    causes = {int(cause): cause.words for cause in Cause if cause}
+    codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
+    alike: dict[tuple[str, str, str], list[int]] = {}
+    first: dict[tuple[str, str, str], str] = {}
+    said: dict[tuple[str, str, str], set[str]] = {}
+    for place, sample in enumerate(campaign["sample"].values.tolist()):
+        if words[place] not in goals:
+            how = str(words[place]), causes.get(int(codes[place]), ""), str(reasons[place])
+            shape = how if how[0].startswith(LOST) else (*how[:2], _PLACES.sub("", how[2]))
+            first.setdefault(shape, how[2])
+            said.setdefault(shape, set()).add(how[2])
+            alike.setdefault(shape, []).append(sample)
+    rows = []
+    why = dict(zip(campaign["sample"].values.tolist(), map(first_clause, reasons), strict=True))
+    for shape, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith(LOST)):
+        mark = "" if len(said[shape]) == 1 else f"sample {samples[0]}: "
+        ending, cause, _ = shape
+        if not cause and all(why[k] in told.get(k, ()) for k in samples):
+            continue
+        how_told = ending + f" ({cause})" * bool(cause), mark + first[shape]
+        named = "sample " if len(samples) == 1 else "samples "
+        named += ", ".join(map(str, samples[:_MOST_NAMED]))
+        named += f" and {len(samples) - _MOST_NAMED} more" * (len(samples) > _MOST_NAMED)
+        rows.append([named, *how_told, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])
+    return rows[:MOST_FAILURES], max(0, len(rows) - MOST_FAILURES)
+
+
+def inputs_drawn(campaign: xr.Dataset) -> Rows:
+    """Name, unit, places, distribution, the values that came out, and the scene's paths that take
+    them: a row an input.
+    """
+    rows = []
+    for name in inputs(campaign):
+        variable = campaign[name]
+        if variable.attrs.get("path") == "solver.error_bars":  # drawn by nobody
+            continue
+        law, values = law_text(distribution_of(variable)), variable.to_numpy()
+        if values.dtype.kind in "OU":
+            counts = Counter(values.ravel().astype(str).tolist()).most_common(6)
+            extent = ", ".join(f"{word} ({n})" for word, n in counts)
+        else:
+            extent = " to ".join(number_text(end, 5) for end in (values.min(), values.max()))
+        places = variable.shape[1] if variable.ndim > 1 else 1
+        unit = unit_text(str(variable.attrs.get("units", "-")))
+        paths = ", ".join(paths_of(variable))
+        rows.append([called(variable), unit, str(places), law, extent, paths])
+    return rows
+
+
+def provenance(campaign: xr.Dataset) -> Iterator[tuple[str, str]]:
+    """Who computed it, when, with what."""
+    for name, value in campaign.attrs.items():
+        if (
+            name in _SHOWN
+            or name.endswith("_version")
+            or name in ("history", "git_commit", "sources")
+        ):
+            yield name.replace("_", " "), str(value)
+
+
+# The pages.
+
+
 def write_report(
     campaign: xr.Dataset, out: Path, folder: str, analysis: xr.Dataset | None = None,
     measurement: Measurement | None = None,
@@ -154,14 +252,14 @@ def page(
     for table in worst_tables(analysis, folder):
         for sample, what, *_ in table.rows:
             found.setdefault(int(sample), []).append(what.removeprefix("no value: "))
-    failures, more = tables.failures(campaign, folder, found)
+    failed, more = failures(campaign, folder, found)
     short = ~np.isin(endings(campaign), (*REACHED, UNKNOWN, NOT_RUN))
     shown = player(campaign, analysis)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = values_of(campaign)
     told = sections(analysis, folder)
     matters = "matters" in told and any(each.rows for each in told["matters"].tables)
-    drawn = sorted(figures_of(campaign), key=lambda each: _turn(each[0].name))
+    pictures = sorted(figures_of(campaign), key=lambda each: _turn(each[0].name))
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
@@ -177,16 +275,16 @@ def page(
                   if name in campaign},
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign),
-        "first": _FIRST, "player": shown, "failures": failures, "more": more,
+        "first": _FIRST, "player": shown, "failures": failed, "more": more,
         "short": bool(short.any()),
         "worst_note": note_on_unusual(analysis),
         "players": {str(sample): k for sample, k in places.items()},
         "notes": [*restart_lines(campaign), *override_lines(campaign)],
-        "inputs": tables.drawn(campaign),
+        "inputs": inputs_drawn(campaign),
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
-        "provenance": list(tables.provenance(campaign)),
+        "provenance": list(provenance(campaign)),
     }  # fmt: skip
-    figures = [(p.name, p.words, f) for p, f in drawn if matters or p.name != _MATTERS]
+    figures = [(p.name, p.words, f) for p, f in pictures if matters or p.name != _MATTERS]
     if measurement is not None:
         apart = residuals(campaign, measurement)
         told["measured"] = Section("measured", "Measured data", [residual_table(apart)])
@@ -226,7 +324,7 @@ def comparison_page(found: xr.Dataset, first: xr.Dataset, second: xr.Dataset) ->
         "names": {name: first[name].attrs.get("long_name", "")
                   for name in comparison_text.differing(found)},
         "sides": [
-            (name, str(each.attrs.get("campaign", "")), list(tables.provenance(each)))
+            (name, str(each.attrs.get("campaign", "")), list(provenance(each)))
             for name, each in zip(names, both, strict=True)
         ],
     }  # fmt: skip

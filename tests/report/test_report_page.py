@@ -30,7 +30,7 @@ from ringsim.plots import figures as of_campaigns
 from ringsim.plots.ring import lines_at
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.report import page as model
-from ringsim.report import shell, tables
+from ringsim.report import shell
 from ringsim.report.page import page
 from ringsim.report.player import player
 from ringsim.report.shell import LARGEST
@@ -176,15 +176,19 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
 
 def test_samples_that_ended_alike_share_a_row_and_words_have_no_unit() -> None:
     campaign = made_campaign(30, failed=(2,), stalled=tuple(range(5, 30)))
-    rows, more = tables.failures(campaign, "made")
+    rows, more = model.failures(campaign, "made")
     assert [row[1] for row in rows] == ["failed: timeout (time limit)", "stalled"]
     assert [row[0] for row in rows] == [
         "sample 2", f"samples {', '.join(map(str, range(5, 25)))} and 5 more",
     ]  # fmt: skip
     assert (rows[1][-1], more) == ("ringsim replay made 5", 0)
-    assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "s"
+    assert {row[0]: row[1] for row in model.inputs_drawn(campaign)}[
+        "cables.lower_winch_stop_time"
+    ] == "s"
     campaign["cables_lower_winch_stop_time"].attrs.pop("units")  # as of words alone
-    assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "-"
+    assert {row[0]: row[1] for row in model.inputs_drawn(campaign)}[
+        "cables.lower_winch_stop_time"
+    ] == "-"
 
 
 def test_how_runs_ended_is_not_told_twice() -> None:
