@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import netCDF4
 import numpy as np
 
-from ringsim.analysis.intervals import quantities
-from ringsim.analysis.optimum import Found, Judged, Problem
+from ringsim.analysis.intervals import LEAST_OF_BOOTSTRAP, quantities
+from ringsim.analysis.optimum import Found, Judged, Objective, Problem
 from ringsim.analysis.verdicts import Verdict
 from ringsim.files import whole, writing
 from ringsim.stepping.instant import Array
@@ -144,6 +144,9 @@ FRESH: dict[str, tuple[tuple[str, ...], str]] = {
     "objective_value": (("objective",), "statistic by the fresh samples of the verdict"),
     "objective_lower": (("objective",), "end of its interval of 95 %"),
     "objective_upper": (("objective",), "end of its interval of 95 %"),
+    "gain": (("objective",), "by how much the statistic is better than that of the present design"),
+    "gain_lower": (("objective",), "end of its interval of 95 %, over pairs of equal samples"),
+    "gain_upper": (("objective",), "end of its interval of 95 %, likewise"),
     "probability": (("requirement",), "share of the fresh samples that keep to the requirement"),
     "probability_lower": (("requirement",), "one-sided lower bound of the probability"),
     "verdict": (("requirement",), "verdict: 0 not met, 1 not yet shown, 2 met"),
@@ -158,6 +161,26 @@ def outputs_of(problem: Problem) -> list[str]:
     """Outputs with a number that are made small, large, or required."""
     aims = (aim.output for aim in problem.objectives)
     return list(dict.fromkeys([*aims, *(name for name, *_ in problem.bounds)]))
+
+
+def gains(aim: Objective, present: Array, other: Array) -> tuple[float, float, float]:
+    """By how much a design is better than the present one, and the interval of 95 % of that, by the
+    bootstrap of pairs; NaN where a sample has no value.
+    """
+    known = np.isfinite(present) & np.isfinite(other)
+    if known.sum() < LEAST_OF_BOOTSTRAP:
+        return np.nan, np.nan, np.nan
+
+    def statistic(values: Array) -> Any:
+        if aim.statistic == "probability":
+            return aim.beyond(values).mean(axis=-1)
+        return aim.shown(aim.steered(values))
+
+    picks = np.random.default_rng(0).integers(0, known.sum(), (400, known.sum()))
+    first, second = present[known], other[known]
+    middle = aim.sign * (statistic(first) - statistic(second))
+    every = aim.sign * (statistic(first[picks]) - statistic(second[picks]))
+    return float(middle), *np.quantile(every, [0.025, 0.975]).tolist()
 
 
 def front_tables(found: "xr.Dataset") -> list[Table]:
@@ -189,6 +212,10 @@ def _designs(found: "xr.Dataset") -> Table:
         unit = f" ({unit_text(told)})" if unit_text(told) else ""
         rows.append((f"{objective}{unit}", *(number_text(factor * v, 4) for v in middle)))
         rows.append(("95 %", *(
+            interval_text(factor * a, factor * b) for a, b in zip(low, high, strict=True)
+        )))  # fmt: skip
+        low, high = (found[f"gain_{end}"].values[1:, k] for end in ("lower", "upper"))
+        rows.append(("better by, 95 %", "", *(
             interval_text(factor * a, factor * b) for a, b in zip(low, high, strict=True)
         )))  # fmt: skip
     for k, words in enumerate(found["requirement_text"].values):

@@ -17,8 +17,7 @@ P(y <= b) >= p is steered by
 with a beyond p by as much as it takes to show p by the samples of the verdict.  What few samples
 and a normal law get wrong is the shift, by which statistics of many fresh samples of a design
 differ from those of its few (Du and Chen, J. Mech. Design 126 (2004) 225).  Interpolated between
-designs that were checked, it corrects f and g.  A round checks the best design and searches on,
-until a check says what was foretold.  Verdicts are told by samples that have chosen nothing.
+designs that were checked, it corrects f and g.  Rounds go on until a check says what was foretold.
 """
 
 import queue
@@ -518,7 +517,8 @@ def course(problem: Problem) -> Course:
         ends = np.array([found.checks[archive.choice(k)].objectives[1] for k in (0, 1)])
         # Scores of probabilities: what lies farther out cannot be told apart.
         far = 3.0 if problem.objectives[1].statistic == "probability" else np.inf
-        near = np.linspace(*np.clip(ends, -far, far).tolist(), problem.front).tolist()
+        low, high = (float(end) for end in np.clip(ends, -far, far))
+        near = np.linspace(low, high, problem.front).tolist()
         levels = [float(ends[0]), *near[1:-1], float(ends[1])]
     for level in levels[1:-1]:
         yield from _rounds(archive, 0, level, each)

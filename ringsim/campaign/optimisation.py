@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from ringsim import build
 from ringsim.analysis.design import endings_of, placement
 from ringsim.analysis.engines import differences
-from ringsim.analysis.front import Axis, outputs_of, write_front
+from ringsim.analysis.front import Axis, gains, outputs_of, write_front
 from ringsim.analysis.intervals import (
     good,
     numbers,
@@ -100,9 +100,9 @@ class Given:
     @property
     def asked(self) -> str:
         """All that decides about what is run, as a text."""
-        wanted, keys = self.present.specification, {"exclude_none": True, "mode": "json"}
+        wanted, keys = self.present.specification, dict[str, Any](exclude_none=True, mode="json")
         left = {"name", "title", "question", "seed", "set", "scene", "design", "requirements"}
-        table = {"seed": self.table.get("seed", 0)}
+        table: dict[str, Any] = {"seed": self.table.get("seed", 0)}
         table |= self.budget.model_dump(by_alias=True, exclude={"objectives"}, **keys)
         table |= wanted.model_dump(exclude=left, **keys)
         table["objectives"] = {
@@ -463,6 +463,12 @@ def _write(course_: _Course) -> None:
         **build.provenance(),
     }  # fmt: skip
     fresh = {name: _verdict(given, folder / name) for name, _ in course_.verdicts}
+    for told in fresh.values():  # the samples of all verdicts are the same
+        pairs = zip(
+            given.problem.objectives, fresh["present"]["values"], told["values"], strict=True
+        )
+        every = np.array([gains(aim, first, second) for aim, first, second in pairs])
+        told |= {"gain": every[:, 0], "gain_lower": every[:, 1], "gain_upper": every[:, 2]}
     write_front(
         folder / FRONT, given.problem, found, axes, lambda p: [*given.values(p).values()], fresh,
         attributes,
@@ -473,14 +479,17 @@ def _write(course_: _Course) -> None:
 
 
 def _verdict(given: Given, folder: Path) -> dict[str, Any]:
-    """What the fresh samples of a design say, by the keys of ``FRESH``."""
+    """What the fresh samples of a design say, by the keys of ``FRESH``, but for the gain; and the
+    values of the objectives.
+    """
     with open_campaign(folder) as campaign:
         ended = np.isin(campaign["outcome"].to_numpy(), [*map(int, GOALS)])
         placed, used = placement(campaign), good(campaign) & ended
-        sample, rows = campaign["sample"].to_numpy(), []
+        sample, rows, kept = campaign["sample"].to_numpy(), [], []
         for each in given.problem.objectives:
             values = numbers(campaign, each.output)
             known = used & np.isfinite(values)
+            kept.append(np.where(known, values, np.nan))
             own, of = values[known], np.mean if each.statistic == "mean" else each.probability
             if not len(own):
                 rows.append((np.nan, np.nan, np.nan))
@@ -496,7 +505,7 @@ def _verdict(given: Given, folder: Path) -> dict[str, Any]:
         apart = {one.name: one for one in differences(campaign)} if checked else {}
         return {
             "objective_value": objective, "objective_lower": lower, "objective_upper": upper,
-            "short": int((~used).sum()),
+            "values": kept, "short": int((~used).sum()),
             "compared": max((len(one.samples) for one in apart.values()), default=0),
             "difference": [float(apart[name].apart.max()) if name in apart else np.nan
                            for name in outputs_of(given.problem)],
