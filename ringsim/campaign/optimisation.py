@@ -1,7 +1,6 @@
 """Which values make an antenna best under what is uncertain: designs that are run as campaigns."""
 
 import contextlib
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -340,9 +339,10 @@ class _Course:
             name = f"{number:03d}-{self.wanted.samples}"
             folder, more = self.folder / _DESIGNS / name, True
             self.tried += self.wanted.samples == SEARCH
-            told = (f"design {self.tried} of at most {most}" if self.tried <= most
-                    else "what the variables buy")  # fmt: skip
-            told = told if self.wanted.samples == SEARCH else "check of the best design so far"
+            told = "check of the best design"
+            if self.wanted.samples == SEARCH:
+                told = f"design {self.tried} of at most {most}"
+                told = told if self.tried <= most else "what a variable buys"
             told += self._best(self.wanted.best)
         else:
             if not self.verdicts:
@@ -368,7 +368,7 @@ class _Course:
             with writing(path):
                 self.folder.mkdir(parents=True, exist_ok=True)
             write_text(path, asked)
-        held, mine = (flat(tomllib.loads(text)) for text in (read_text(path), asked))
+        held, mine = (flat(parse_toml(text, _ASKED)) for text in (read_text(path), asked))
         for key in {**mine, **held}:
             if mine.get(key) != held.get(key):
                 values = (show(each[key]) if key in each else "nothing" for each in (mine, held))
@@ -386,7 +386,7 @@ class _Course:
             value = float(aim.shown(steered))
             factor, unit = readable(aim.units, abs(value))
             words.append(f"{aim.told} {factor * value:.4g} {unit_text(unit)}".rstrip())
-        return f" (best: {', '.join(words)})"
+        return f", best so far: {', '.join(words)}"
 
     def _hopeless(self) -> str:
         survey = open_folder(self.ordered[0].folder).survey()

@@ -172,6 +172,18 @@ def test_what_a_variable_buys_is_in_the_designs_that_were_tried_and_their_checks
     assert not front["tried_lost"].values.any()
 
 
+def test_gain_is_that_of_pairs_of_equal_samples(found):
+    front, out = found
+    first, second = (ringsim.open_campaign(out / name) for name in ("present", "design-1"))
+    assert first["sample_seed"].values.tolist() == second["sample_seed"].values.tolist()
+    apart = first["peak_tension"].values - second["peak_tension"].values
+    low, high = (float(front[f"gain_{end}"][1, 0]) for end in ("lower", "upper"))
+    assert float(front["gain"][1, 0]) == pytest.approx(apart.mean())
+    assert low < apart.mean() < high
+    assert high - low == pytest.approx(2.0 * 1.96 * apart.std() / 24**0.5, rel=0.2)
+    assert float(front["gain"][0, 0]) == 0.0
+
+
 def test_a_probability_is_the_share_of_the_fresh_samples_beyond(found, file):
     _, out = found
     known = ringsim.open_campaign(out / "present")["peak_tension"].values
@@ -261,7 +273,7 @@ def test_what_is_missing_is_run_and_nothing_else(found, file, tmp_path):
     again = tmp_path / "out"
     shutil.copytree(out, again)
     (again / FRONT).unlink()
-    shutil.rmtree(again / "present")  # the last but one: all before it is there
+    shutil.rmtree(sorted((again / "designs").glob("*-search"))[-2])  # all others are there
     kept = {path: path.stat().st_mtime_ns for path in again.rglob("*.journal")}
     xr.testing.assert_equal(ringsim.Optimisation.read(file).run(workers=0, out=again), front)
     assert all(path.stat().st_mtime_ns == time_ for path, time_ in kept.items())
