@@ -330,7 +330,7 @@ class _Search:
             self._asked.put(error)
 
 
-class _Archive:
+class Archive:
     """All designs with what samples say of them."""
 
     def __init__(self, problem: Problem) -> None:
@@ -501,7 +501,7 @@ def course(problem: Problem) -> Course:
 
     It ends at once if no sample of the present design has a value.
     """
-    archive = _Archive(problem)
+    archive = Archive(problem)
     found, start = archive.found, problem.start
     yield from archive.at(start)
     if not np.isfinite(found.judged[0].parts).all():
@@ -534,7 +534,7 @@ def course(problem: Problem) -> Course:
     return found
 
 
-def _search(archive: _Archive, designs: int, which: int) -> Generator[Wanted, Values, None]:
+def _search(archive: Archive, designs: int, which: int) -> Generator[Wanted, Values, None]:
     """A search by COBYQA from the best design known."""
     search = _Search(archive.found.points[archive.best(which)], designs)
     try:
@@ -547,7 +547,7 @@ def _search(archive: _Archive, designs: int, which: int) -> Generator[Wanted, Va
 
 
 def _rounds(
-    archive: _Archive, which: int, level: float, designs: int
+    archive: Archive, which: int, level: float, designs: int
 ) -> Generator[Wanted, Values, None]:
     """Check the best design and search on from the best known, until a search comes to its end and
     the check of what it found says what was foretold, and no bound is broken; with so many designs
@@ -568,7 +568,7 @@ def _rounds(
 
 
 def _steps(
-    archive: _Archive, which: int, level: float, designs: int
+    archive: Archive, which: int, level: float, designs: int
 ) -> Generator[Wanted, Values, bool]:
     """Steps on smooth surfaces, so many at most; whether they have come to an end."""
     radius, points = _LATER_STEP, archive.found.points

@@ -462,7 +462,7 @@ def _write(course_: _Course) -> None:
         "verdict_samples": budget.verdict, "most_designs": budget.designs,
         **build.provenance(),
     }  # fmt: skip
-    fresh = {name: _verdict(given, folder / name) for name, _ in course_.verdicts}
+    fresh = {name: fresh_verdict(given, folder / name) for name, _ in course_.verdicts}
     for told in fresh.values():  # the samples of all verdicts are the same
         pairs = zip(
             given.problem.objectives, fresh["present"]["values"], told["values"], strict=True
@@ -478,7 +478,7 @@ def _write(course_: _Course) -> None:
         write_text(folder / f"{name}.toml", text)
 
 
-def _verdict(given: Given, folder: Path) -> dict[str, Any]:
+def fresh_verdict(given: Given, folder: Path) -> dict[str, Any]:
     """What the fresh samples of a design say, by the keys of ``FRESH``, but for the gain; and the
     values of the objectives.
     """

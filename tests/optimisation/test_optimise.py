@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 import ringsim
 from ringsim.analysis.front import front_tables
-from ringsim.campaign.optimisation import FRONT, _verdict, optimisation_of
+from ringsim.campaign.optimisation import FRONT, fresh_verdict, optimisation_of
 from ringsim.cli import cli
 from ringsim.overrides import with_number
 from ringsim.refusal import InputError
@@ -190,7 +190,7 @@ def test_a_probability_is_the_share_of_the_fresh_samples_beyond(found, file):
     middle = float(np.median(known)) + 1e-9
     change = 'minimise = "probability", max = ' + repr(middle)
     given = optimisation_of(FILE.replace('minimise = "mean"', change), file)
-    told = _verdict(given, out / "present")
+    told = fresh_verdict(given, out / "present")
     assert told["objective_value"].tolist() == [0.5]
     low, high = scipy.stats.binomtest(12, 24).proportion_ci(0.95, "exact")
     np.testing.assert_allclose(

@@ -11,11 +11,11 @@ import scipy
 from ringsim.analysis.optimum import (
     CHECK,
     SEARCH,
+    Archive,
     Judged,
     Objective,
     Problem,
     Wanted,
-    _Archive,
     aimed,
     course,
     judged,
@@ -206,7 +206,7 @@ def test_no_design_of_a_front_is_worse_in_both():
 
 def checked_archive(objectives, beyond, errors, lost):
     """Checked designs with these statistics; the scales are 1."""
-    archive = _Archive(Problem([Objective("y")], {"y": WANTED}, np.array([0.5]), 24, 1000))
+    archive = Archive(Problem([Objective("y")], {"y": WANTED}, np.array([0.5]), 24, 1000))
     archive.scales = np.ones(2)
     for k, (f, g, error, share) in enumerate(zip(objectives, beyond, errors, lost, strict=True)):
         one = Judged(np.array([f]), np.array([g]), share, np.array([0.0, error]))
