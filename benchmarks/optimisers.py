@@ -18,6 +18,9 @@ import numpy as np
 import scipy
 from scipy.stats import qmc
 
+from ringsim.analysis.optimum import Objective, Problem, course
+from ringsim.analysis.requirements import Requirement
+
 Value = Callable[[np.ndarray], tuple[float, float]]
 """Cost and constraint (at most 0) at a point."""
 BATCH = 8
@@ -70,6 +73,19 @@ def cobyqa(value: Value, size: int, count: int, _seed: int) -> None:
         constraints=scipy.optimize.NonlinearConstraint(lambda x: at(x)[1], -np.inf, 0.0),
         options={"maxfev": count, "initial_tr_radius": 0.25},
     )  # fmt: skip
+
+
+def rounds(value: Value, size: int, count: int, _seed: int) -> None:
+    """What ringsim optimise does: the same, then steps on radial functions."""
+    wanted = {"y": Requirement(max=0.0, probability=0.5, confidence=0.6)}
+    asked = Problem([Objective("c")], wanted, np.full(size, 0.5), count, 1000)
+    search, told, known = course(asked), None, dict[bytes, tuple[float, float]]()
+    with contextlib.suppress(StopIteration):
+        while True:
+            design = search.send(told)
+            if (key := design.point.tobytes()) not in known:
+                known[key] = value(design.point)
+            told = {name: np.full(4, each) for name, each in zip("cy", known[key], strict=True)}
 
 
 def tpe(value: Value, size: int, count: int, seed: int) -> None:
@@ -128,7 +144,7 @@ def main() -> None:
     for size in (2, 4, 8):
         for count in (40, 80):
             cells = []
-            for search in (sobol, tpe, cma_es, nsga2, cobyqa):
+            for search in (sobol, tpe, cma_es, nsga2, cobyqa, rounds):
                 left = []
                 with contextlib.suppress(ImportError):
                     for seed in range(wanted.problems):

@@ -66,6 +66,8 @@ _SAYS = {
     "digits, dots, dashes and underscores",
     "string_too_long": "{shown} must have at most {max_length} characters",
     "literal_error": "{shown} must be {expected}",
+    "too_short": "{where} must have {min_length} or more entries",
+    "too_long": "{where} must have {max_length} entries at most",
     "model": "{shown} must be a table: write [{where}], and its keys on the lines below",
     "dict": "{shown} must be a table: write [{where}], and its keys on the lines below",
     "tuple": "{shown} must be one value, or a list with a value for each section",

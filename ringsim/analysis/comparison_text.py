@@ -5,11 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import DOUBT, NOTE, marked
+from ringsim.analysis.campaign_notes import NOTE, marked
 from ringsim.analysis.indices import largest_by_chance
 from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section
 from ringsim.analysis.verdicts import Verdict
+from ringsim.outputs.base import DOUBT
 from ringsim.tables import (
     Table,
     counted,

@@ -1,20 +1,27 @@
 """Which values make an antenna best under what is uncertain: designs that are run as campaigns."""
 
-import json
+import contextlib
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-import netCDF4
 import numpy as np
 import tomli_w
 import xarray as xr
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import ValidationError
 
 from ringsim import build
-from ringsim.analysis.design import placement
-from ringsim.analysis.intervals import good, numbers, quantities, samples_needed
+from ringsim.analysis.design import endings_of, placement
+from ringsim.analysis.engines import differences
+from ringsim.analysis.front import Axis, gains, outputs_of, write_front
+from ringsim.analysis.intervals import (
+    good,
+    numbers,
+    quantities,
+    share_interval,
+)
 from ringsim.analysis.optimum import (
     CHECK,
     DIGITS,
@@ -22,123 +29,37 @@ from ringsim.analysis.optimum import (
     VERDICT,
     Course,
     Found,
-    Objective,
     Problem,
     Values,
     Wanted,
     course,
 )
-from ringsim.analysis.requirements import OUTCOME, Requirements
+from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.verdicts import judge
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, require_no_launcher, start
-from ringsim.campaign.specification import Campaign, campaign_of
-from ringsim.files import parse_toml, read_text, whole, write_text, writing
+from ringsim.campaign.specification import Budget, Campaign, Specification, Variable, campaign_of
+from ringsim.files import parse_toml, read_text, write_text, writing
 from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, holds
-from ringsim.overrides import field_at, flat
+from ringsim.overrides import field_at, flat, with_number
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain, known_or_nearest, show
 from ringsim.sampling.table import first_inside, refuse_fixed
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
-from ringsim.units import ListIn, Model, unit_at
+from ringsim.tables import counted, readable, unit_text
+from ringsim.units import unit_at
 from ringsim.variables import GOALS, Fate, Status
 
 FRONT = "front.nc"
 """The result of an optimisation, in its folder."""
+_ASKED = "optimisation.toml"
+"""What the folder is run with, all values."""
 _NAME = "ringsim.Optimisation"
 """How refusals of arguments begin, as those of files with the file's name."""
 _DESIGNS = "designs"
 """Folder of the campaigns of the search."""
-
-
-class Variable(Model):
-    """What may be chosen: a scene value between two bounds."""
-
-    low: float
-    high: float
-    scale: Literal["linear", "log"] = "linear"
-    """Whether steps or ratios of the value matter."""
-    shared: Annotated[tuple[str, ...], ListIn] = ()
-    """Scene paths that all take the value, if the name is none, or not the only one."""
-
-    @model_validator(mode="after")
-    def _in_order(self) -> "Variable":
-        if not self.low < self.high:
-            raise ValueError(f"low = {self.low:g} must be below high = {self.high:g}")
-        if self.scale == "log" and self.low <= 0.0:
-            raise ValueError(f'low = {self.low:g} must be above 0 for scale = "log"')
-        return self
-
-    def value(self, share: float) -> float:
-        """The value at a place between low (0) and high (1)."""
-        if self.scale == "log":
-            return float(self.low * (self.high / self.low) ** share)
-        return float(self.low + (self.high - self.low) * share)
-
-    def share(self, value: float) -> float:
-        """The place of a value."""
-        if self.scale == "log":
-            return float(np.log(value / self.low) / np.log(self.high / self.low))
-        return (value - self.low) / (self.high - self.low)
-
-
-class Aim(Model):
-    """A statistic of an output, to be made small or large."""
-
-    minimise: Literal["mean", "quantile"] | None = None
-    maximise: Literal["mean", "quantile"] | None = None
-    probability: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
-    """Below the quantile."""
-
-    @model_validator(mode="after")
-    def _one_of_two(self) -> "Aim":
-        if (self.minimise is None) == (self.maximise is None):
-            raise ValueError('needs either minimise = "mean" or maximise = "mean", or "quantile"')
-        if ("quantile" in (self.minimise, self.maximise)) != (self.probability is not None):
-            raise ValueError("probability goes with a quantile: give both, or neither")
-        return self
-
-    def objective(self, output: str) -> Objective:
-        """The same for the search."""
-        statistic = self.minimise or self.maximise or "mean"
-        sign = 1.0 if self.minimise is not None else -1.0
-        return Objective(output, statistic, self.probability or 0.5, sign)
-
-
-class Budget(Model):
-    """What an optimisation file has beyond the keys of a campaign file."""
-
-    variables: Annotated[
-        dict[str, Variable], BeforeValidator(lambda table: flat(table, "low")), Field(min_length=1)
-    ]
-    """What may be chosen, by scene path."""
-    objectives: Annotated[dict[str, Aim], Field(min_length=1, max_length=2)]
-    """What is made small or large, by output; two give a front."""
-    constraints: Requirements = Field(default_factory=dict)
-    """Requirements, as of a campaign file."""
-    designs: Annotated[int, Field(ge=4, le=100_000)] = 60
-    """Designs that the search runs, at most."""
-    samples: Annotated[int, Field(ge=4, le=100_000)] = 16
-    """Of each design in the search."""
-    check: Annotated[int, Field(ge=16, le=1_000_000)] = 100
-    """Fresh samples of a design that the search has found, which correct it."""
-    verdict: Annotated[int, Field(ge=16, le=10_000_000)] = 300
-    """Fresh samples of the present and of each chosen design, which judge it."""
-    front: Annotated[int, Field(ge=2, le=100)] = 5
-    """Designs along the front of two objectives."""
-
-    @model_validator(mode="after")
-    def _can_be_shown(self) -> "Budget":
-        for name, wanted in self.constraints.items():
-            if (least := samples_needed(0, wanted.probability, wanted.confidence)) > self.verdict:
-                raise ValueError(
-                    f"verdict = {self.verdict}: so few samples never show constraints.{name} with "
-                    f"probability {wanted.probability:g} and confidence {wanted.confidence:g}: set "
-                    f"verdict = {least} at least, better twice that"
-                )
-        return self
 
 
 @dataclass(frozen=True)
@@ -175,6 +96,20 @@ class Given:
             found[name] = float(value if same[k] else f"{value:.8g}")
         return found
 
+    @property
+    def asked(self) -> str:
+        """All that decides about what is run, as a text."""
+        wanted, keys = self.present.specification, dict[str, Any](exclude_none=True, mode="json")
+        left = {"name", "title", "question", "seed", "set", "scene", "design", "requirements"}
+        table: dict[str, Any] = {"seed": self.table.get("seed", 0)}
+        table |= self.budget.model_dump(by_alias=True, exclude={"objectives"}, **keys)
+        table |= wanted.model_dump(exclude=left, **keys)
+        table["objectives"] = {
+            name: aim.model_dump(exclude_unset=True) for name, aim in self.budget.objectives.items()
+        }
+        table["scene"] = self.present.scene.to_table()
+        return tomli_w.dumps(table)
+
     def settings_of(self, point: Array) -> dict[str, float]:
         """Value by scene path."""
         known = self.values(point)
@@ -196,8 +131,8 @@ def _campaign(
     own = dict(table)
     turn = (SEARCH, CHECK, VERDICT).index(samples)
     # The search has the same samples in all designs; what judges it has others.
-    own["seed"] = int(own.get("seed", 0)) + turn
-    own["name"] = f"{own['name']}-{name}"
+    own["seed"] = (own.get("seed", 0) + turn) % 2**63
+    own["name"] = f"{own['name'][:60]}-{name}"
     if samples == SEARCH:
         own["design"] = {"kind": "latin-hypercube", "samples": budget.samples}
         own.pop("check_every", None)
@@ -228,46 +163,68 @@ def optimisation_of(
     table, settings = parse_toml(text, path.name), dict(settings or {})
     sizes = ("designs", "samples", "check", "verdict", "front")
     table |= {name: settings.pop(name) for name in sizes if name in settings}
-    own = {name: table.pop(name) for name in Budget.model_fields if name in table}
-    try:
-        budget = Budget.model_validate(own)
-    except ValidationError as error:
-        raise InputError(explain(error, Budget, path.name)) from None
-    for key, cure in {
-        "design": "an optimisation places its own samples: leave it out, and set samples, check "
-                  "and verdict",
-        "requirements": "an optimisation calls them constraints: rename it",
-        "stop_when": "each design runs all its samples: leave it out",
-        "looks": "each design runs all its samples: leave it out",
-        "max_failed": "designs whose runs fail are passed over: leave it out",
-        "error_bars_every": "leave it out, and run a chosen design with error bars",
-    }.items():  # fmt: skip
+    for key, cure in _NOT_HERE.items():
         if key in table:
-            raise InputError(f"{path.name}: {key}: {cure}")
+            raise InputError(f"{path.name}: {key}: {cure}: leave it out")
+    known = {*Budget.model_fields, *Specification.model_fields} - {*_NOT_HERE}
+    if strange := [key for key in table if key not in known and key not in Specification.gone]:
+        hint = known_or_nearest(strange[0], sorted(known))
+        raise InputError(f"{path.name}: {strange[0]} is not a known key ({hint})")
+    own = {name: table.pop(name) for name in Budget.model_fields if name in table}
+    table.setdefault("fidelity", "frame")
+    for model, part in (
+        (Specification, table | {"design": {"kind": "random", "samples": 16}}), (Budget, own)
+    ):  # fmt: skip
+        try:  # as it stands in the file: names and seeds of its campaigns are others
+            model.model_validate(part)
+        except ValidationError as error:
+            raise InputError(explain(error, model, path.name)) from None
+    budget = Budget.model_validate(own)
     if "front" in own and len(budget.objectives) == 1:
         raise InputError(f"{path.name}: front: one objective has one best design: leave it out")
-    table.setdefault("fidelity", "frame")
     if not table.get("inputs"):
         raise InputError(
             f"{path.name}: inputs: nothing is uncertain: give distributions of what is not known"
         )
-    present = _campaign(path, table, settings, scene, budget, VERDICT, "present")
+    try:
+        present = _campaign(path, table, settings, scene, budget, VERDICT, "present")
+    except InputError as error:  # its campaigns call them requirements
+        raise InputError(str(error).replace(" requirements.", " constraints.", 1)) from None
     for name in budget.objectives:
         _require_output(path.name, name, present.scene)
+    taken = dict[str, str]()
     start_ = np.array([
-        _begin(path.name, name, law, present) for name, law in budget.variables.items()
+        _begin(path.name, name, law, present, taken) for name, law in budget.variables.items()
     ])  # fmt: skip
     given = Given(path, table, settings, scene, budget, present, start_)
     if budget.designs < (least := given.problem.least):
         levels = f" and {given.problem.front} levels" if given.problem.front > 1 else ""
         raise InputError(
-            f"{path.name}: designs = {budget.designs}: too few for {len(start_)} variables{levels}:"
-            f" set designs = {least} at least"
+            f"{path.name}: designs = {budget.designs}: too few for "
+            f"{counted(len(start_), 'variable')}{levels}: set designs = {least} at least"
         )
     present.draw()
-    for side in (0.0, 1.0):
-        given.campaign(Wanted(SEARCH, np.full(len(start_), side)), "bounds")
+    for side in ("low", "high"):
+        corner = {path: getattr(law, side) for name, law in budget.variables.items()
+                  for path in law.shared or (name,)}  # fmt: skip
+        try:
+            present.scene.with_values(corner)
+        except InputError as error:
+            raise InputError(
+                f"{path.name}: variables: with all at their {side}: {error}; narrow their bounds"
+            ) from None
     return given
+
+
+_NOT_HERE = {
+    "design": "an optimisation places its own samples, by samples, check and verdict",
+    "requirements": "an optimisation calls them constraints",
+    "stop_when": "each design runs all its samples",
+    "looks": "each design runs all its samples",
+    "max_failed": "designs whose runs fail are passed over",
+    "error_bars_every": "a chosen design may be run with error bars",
+}
+"""Keys of campaign files that an optimisation has no use for, and why."""
 
 
 def _require_output(file: str, name: str, scene: Scene) -> None:
@@ -283,36 +240,62 @@ def _require_output(file: str, name: str, scene: Scene) -> None:
         )
 
 
-def _begin(file: str, name: str, law: Variable, present: Campaign) -> float:
-    """Where a variable of the present design is between its bounds; InputError if it is not."""
+def _begin(
+    file: str, name: str, law: Variable, present: Campaign, taken: dict[str, str]
+) -> float:  # fmt: skip
+    """Where a variable of the present design is between its bounds; InputError if it is not.
+
+    Its paths join those that are ``taken``, with its name.
+    """
     where, inputs = f"{file}: variables.{name}", present.specification.inputs
-    drawn = [path for key, each in inputs.items() for path in (each.shared or (key,))]
+    scene, paths = present.scene, law.shared or (name,)
+    if not law.shared and "." not in name:
+        raise InputError(
+            f"{where}: {name} is no scene path: give those that take its value, as shared = "
+            '["cables.upper.winch.winding.speed", ...], or a path in its place'
+        )
+    drawn = {with_number(scene, path): key for key, each in inputs.items()
+             for path in each.shared or (key,)}  # fmt: skip
     values = []
-    for path in law.shared or (name,):
+    for path in paths:
+        before: Any = None
         try:
-            refuse_fixed(present.scene, path)
-            value = field_at(present.scene.with_values({path: law.low}), path)
-            before = field_at(present.scene, path)
+            refuse_fixed(scene, path)
+            own = with_number(scene, path)
+            with contextlib.suppress(AttributeError):
+                before = field_at(scene, path)
+            if isinstance(before, int) and not isinstance(before, bool):
+                raise InputError(
+                    f"{path} = {before} is a whole number, and variables have decimals: leave it "
+                    "out, and run one optimisation for each value, under [set]"
+                )
+            value = field_at(scene.with_values({path: law.low}), path)
         except (InputError, AttributeError) as error:
             told = str(error).removeprefix("inputs: ")
-            raise InputError(f"{where}: {told}") from None
+            side = ".low" if f"{path} = {law.low}" in told else ""
+            raise InputError(f"{where}{side}: {told}") from None
         if not isinstance(value, float) or not isinstance(before, float):
             raise InputError(
                 f"{where}: {path} is {show(before)} in the scene, and must be one number there: "
                 "name its places one by one, or set a number under [set]"
             )
-        if (
-            path in drawn
-            or first_inside(path, drawn)
-            or any(first_inside(d, [path]) for d in drawn)
-        ):
-            raise InputError(f"{where}: {path} is also drawn as an input: leave out one of the two")
+        for others, what in ((drawn, "drawn as input"), (taken, "set by variable")):
+            outer = next((o for o in others if first_inside(o, [own])), "")
+            if other := own if own in others else first_inside(own, others) or outer:
+                by = f"{what} {others[other]}" if others[other] != name else "named before"
+                raise InputError(f"{where}: {path} is also {by}: leave out one of the two")
+        taken[own] = name
         values.append(before)
     if len(set(values)) > 1:
         raise InputError(
             f"{where}.shared: the scene has {', '.join(f'{v:g}' for v in values)} there, and they "
             "take one value: set them equal under [set]"
         )
+    for side in ("low", "high"):
+        try:
+            scene.with_values(dict.fromkeys(paths, getattr(law, side)))
+        except InputError as error:
+            raise InputError(f"{where}.{side}: {error}") from None
     if not law.low <= values[0] <= law.high:
         raise InputError(
             f"{where}: the scene has {values[0]:g}, where the search begins, and {law.low:g} .. "
@@ -333,11 +316,13 @@ class _Course:
     found: Found | None = None
     verdicts: list[tuple[str, Array]] = field(default_factory=list)
     """Designs that are judged, by the names of their folders."""
+    tried: int = 0
+    """Designs that have been ordered so far."""
 
     def order(self) -> Order:
         """The next campaign, from the results of those before."""
         if not self.ordered:
-            (self.folder / FRONT).unlink(missing_ok=True)
+            self._keep_asked()
             self.course = course(self.given.problem)
             self.wanted = next(self.course)
         elif self.found is None:
@@ -346,23 +331,73 @@ class _Course:
                 self.wanted = self.course.send(self._values(self.ordered[-1].folder))
             except StopIteration as end:
                 self.found = end.value
-        number = len(self.ordered) + 1
+                if not self.found.checks:
+                    raise InputError(self._hopeless()) from None
+        number, most = len(self.ordered) + 1, self.given.budget.designs
         if self.found is None:
             assert self.wanted is not None
             name = f"{number:03d}-{self.wanted.samples}"
             folder, more = self.folder / _DESIGNS / name, True
+            self.tried += self.wanted.samples == SEARCH
+            told = "check of the best design"
+            if self.wanted.samples == SEARCH:
+                told = f"design {self.tried} of at most {most}"
+                told = told if self.tried <= most else "what a variable buys"
+            told += self._best(self.wanted.best)
         else:
             if not self.verdicts:
-                chosen = [each.point for each in self.found.chosen]
+                chosen = [self.found.points[each.place] for each in self.found.chosen]
                 names = [f"design-{k + 1}" for k in range(len(chosen))]
                 self.verdicts = [("present", self.given.start), *zip(names, chosen, strict=True)]
             done = sum(each.folder.parent == self.folder for each in self.ordered)
             name, point = self.verdicts[done]
             self.wanted = Wanted(VERDICT, point)
             folder, more = self.folder / name, done + 1 < len(self.verdicts)
-        made = Order(self.given.campaign(self.wanted, name), folder, more=more, brief=True)
+            told = f"verdict on {name}, {done + 1} of {len(self.verdicts)}"
+        made = Order(
+            self.given.campaign(self.wanted, name), folder, more=more, brief=True,
+            label=f"{self.given.table['name']}: {told}",
+        )  # fmt: skip
         self.ordered.append(made)
         return made
+
+    def _keep_asked(self) -> None:
+        """Keep what is asked for in the folder; InputError if it has another optimisation."""
+        path, asked = self.folder / _ASKED, self.given.asked
+        if not path.exists():
+            with writing(path):
+                self.folder.mkdir(parents=True, exist_ok=True)
+            write_text(path, asked)
+        held, mine = (flat(parse_toml(text, _ASKED)) for text in (read_text(path), asked))
+        for key in {**mine, **held}:
+            if mine.get(key) != held.get(key):
+                values = (show(each[key]) if key in each else "nothing" for each in (mine, held))
+                raise InputError(
+                    f"{self.folder}: this folder has another optimisation: {key} = "
+                    f"{' instead of '.join(values)}: choose another folder with --out"
+                )
+
+    def _best(self, best: Array | None) -> str:
+        """The objectives of the best design so far, in words."""
+        if best is None:
+            return ""
+        words = []
+        for aim, steered in zip(self.given.problem.objectives, best, strict=True):
+            value = float(aim.shown(steered))
+            factor, unit = readable(aim.units, abs(value))
+            words.append(f"{aim.told} {factor * value:.4g} {unit_text(unit)}".rstrip())
+        return f", best so far: {', '.join(words)}"
+
+    def _hopeless(self) -> str:
+        survey = open_folder(self.ordered[0].folder).survey()
+        ends = Counter(endings_of(survey.status, survey.fate).tolist())
+        told = ", ".join(f"{count} {word}" for word, count in ends.most_common(3))
+        return (
+            f"{self.given.path.name}: none of {counted(len(survey.status), 'sample')} of the "
+            f"present design reaches its goal with all outputs that are asked for ({told}), so "
+            "that the search has nowhere to begin: set another present design under [set], or a "
+            "longer solver.end_time"
+        )
 
     def _values(self, folder: Path) -> Values:
         """What a design's samples gave of all that is wanted; NaN of those that do not count."""
@@ -383,7 +418,8 @@ class _Course:
 
     def then(self, folder: Path) -> None:
         """Write what was found, unless runs are missing."""
-        if self.found is not None and not len(open_folder(folder).survey().missing):
+        held = open_folder(folder)
+        if self.found is not None and not len(held.survey().missing) + len(held.unchecked()):
             _write(self)
 
 
@@ -412,123 +448,67 @@ def run_optimisation(
 
 def _write(course_: _Course) -> None:
     """The file of the front, and the scenes of the designs on it."""
-    given, found = course_.given, course_.found
+    given, found, folder = course_.given, course_.found, course_.folder
     assert found is not None
-    problem, names = given.problem, [name for name, _ in course_.verdicts]
-    points = [point for _, point in course_.verdicts]
-    parts = [_verdict(given, course_.folder / name) for name in names]
-    requirements = [*given.budget.constraints]
-    variables, aims = [*given.budget.variables], [each.told for each in problem.objectives]
-    signs = np.array([each.sign for each in problem.objectives])
-    bounds = [f"{name} {'<=' if s > 0 else '>='} {b:g}" for name, s, b, _ in problem.bounds]
-    units = [unit_at(given.present.scene, (law.shared or (name,))[0])
-             for name, law in given.budget.variables.items()]  # fmt: skip
-    width = len(found.points), len(variables)
-    every = np.array([[*given.values(p).values()] for p in found.points]).reshape(width)
-    objectives = np.array([signs * one.objectives for one in found.judged])
-    without = np.full((len(names), len(variables), len(aims)), np.nan)
-    beyond_without = np.full((len(names), len(variables), len(bounds)), np.nan)
-    few = np.full((len(names), len(aims)), np.nan)
-    few_beyond = np.full((len(names), len(bounds)), np.nan)
-    first = found.judged[0]
-    few[0], few_beyond[0] = signs * first.objectives, first.beyond
-    for k, chosen in enumerate(found.chosen, start=1):
-        few[k], few_beyond[k] = signs * chosen.search.objectives, chosen.search.beyond
-        without[k] = [signs * one.objectives for one in chosen.without]
-        beyond_without[k] = np.array([one.beyond for one in chosen.without]).reshape(
-            len(variables), len(bounds)
-        )
-    tried, own = ("tried", "variable"), ("design", "variable")
-    says: dict[str, tuple[tuple[str, ...], Any, str]] = {
-        "tried_value": (tried, every, "values of all designs that the search has run"),
-        "tried_objective": (("tried", "objective"), objectives,
-                            "statistic by the few samples of the search"),
-        "tried_beyond": (("tried", "bound"), np.array([j.beyond for j in found.judged]).reshape(
-            len(found.judged), len(bounds)), "quantile aimed at less the bound, by these samples"),
-        "tried_lost": (("tried",), np.array([j.lost for j in found.judged]),
-                       "share of samples without a value"),
-        "value": (own, np.array([[*given.values(p).values()] for p in points]),
-                  "values of the present design, and of the chosen ones"),
-        "objective_value": (("design", "objective"), np.array([p["objective"] for p in parts]),
-                            "statistic by the fresh samples of the verdict"),
-        "objective_lower": (("design", "objective"), np.array([p["lower"] for p in parts]),
-                            "end of its interval of 95 %"),
-        "objective_upper": (("design", "objective"), np.array([p["upper"] for p in parts]),
-                            "end of its interval of 95 %"),
-        "probability": (("design", "requirement"), np.array([p["probability"] for p in parts]),
-                        "share of the fresh samples that keep to the requirement"),
-        "probability_lower": (("design", "requirement"),
-                              np.array([p["probability_lower"] for p in parts]),
-                              "one-sided lower bound of the probability"),
-        "verdict": (("design", "requirement"), np.array([p["verdict"] for p in parts]),
-                    "verdict: 0 not met, 1 not yet shown, 2 met"),
-        "short": (("design",), np.array([p["short"] for p in parts]),
-                  "fresh samples that failed or ended before their goal"),
-        "searched": (("design", "objective"), few, "statistic by the few samples of the search"),
-        "searched_beyond": (("design", "bound"), few_beyond,
-                            "quantile aimed at less the bound, by these samples"),
-        "without": (("design", "variable", "objective"), without,
-                    "statistic, by the few samples, with the variable as it is at present"),
-        "without_beyond": (("design", "variable", "bound"), beyond_without,
-                           "the same of the quantile aimed at less the bound"),
-        "low": (("variable",), [v.low for v in given.budget.variables.values()], "least value"),
-        "high": (("variable",), [v.high for v in given.budget.variables.values()],
-                 "largest value"),
-    }  # fmt: skip
-    texts = [wanted.told(name) for name, wanted in given.budget.constraints.items()]
-    words = {"design": names, "variable": variables, "objective": aims, "bound": bounds,
-             "requirement": requirements, "variable_units": units,
-             "objective_units": [quantities()[o.output].units for o in problem.objectives],
-             "requirement_text": texts}  # fmt: skip
-    asked = given.present.specification
+    axes = [
+        Axis(name, unit_at(given.present.scene, (law.shared or (name,))[0]), law.low, law.high)
+        for name, law in given.budget.variables.items()
+    ]
+    asked, budget = given.present.specification, given.budget
     attributes = {
         "title": str(given.table.get("title", "")), "question": asked.question,
         "name": given.table["name"], "scene": given.present.scene.to_toml(),
-        "fidelity": asked.fidelity,
-        "signs": json.dumps(signs.tolist()), "samples": given.budget.samples,
-        "verdict_samples": given.budget.verdict, "designs": len(found.points),
+        "fidelity": asked.fidelity, "samples": budget.samples, "check_samples": budget.check,
+        "verdict_samples": budget.verdict, "most_designs": budget.designs,
         **build.provenance(),
     }  # fmt: skip
-    path = course_.folder / FRONT
-    with writing(path), whole(path) as draft, netCDF4.Dataset(draft, "w") as file:
-        file.setncatts(attributes)
-        sizes = {name: len(words[name]) for name in
-                 ("design", "variable", "objective", "bound", "requirement")}  # fmt: skip
-        for name, size in (sizes | {"tried": len(found.points)}).items():
-            file.createDimension(name, size)
-        for name, known in words.items():
-            along = name if name in sizes else name.partition("_")[0]
-            file.createVariable(name, str, (along,))[:] = np.array(known, dtype=object)
-        for name, (dims, values, meaning) in says.items():
-            array = np.asarray(values)
-            made = file.createVariable(name, "i8" if array.dtype.kind == "i" else "f8", dims)
-            if array.size:
-                made[...] = array
-            made.setncatts({"long_name": meaning})
+    fresh = {name: fresh_verdict(given, folder / name) for name, _ in course_.verdicts}
+    for told in fresh.values():  # the samples of all verdicts are the same
+        pairs = zip(
+            given.problem.objectives, fresh["present"]["values"], told["values"], strict=True
+        )
+        every = np.array([gains(aim, first, second) for aim, first, second in pairs])
+        told |= {"gain": every[:, 0], "gain_lower": every[:, 1], "gain_upper": every[:, 2]}
+    write_front(
+        folder / FRONT, given.problem, found, axes, lambda p: [*given.values(p).values()], fresh,
+        attributes,
+    )  # fmt: skip
     for name, point in course_.verdicts[1:]:
         text = given.present.scene.with_values(given.settings_of(point)).to_toml()
-        write_text(course_.folder / f"{name}.toml", text)
+        write_text(folder / f"{name}.toml", text)
 
 
-def _verdict(given: Given, folder: Path) -> dict[str, Any]:
-    """What the fresh samples of a design say."""
+def fresh_verdict(given: Given, folder: Path) -> dict[str, Any]:
+    """What the fresh samples of a design say, by the keys of ``FRESH``, but for the gain; and the
+    values of the objectives.
+    """
     with open_campaign(folder) as campaign:
         ended = np.isin(campaign["outcome"].to_numpy(), [*map(int, GOALS)])
         placed, used = placement(campaign), good(campaign) & ended
-        sample, rows = campaign["sample"].to_numpy(), []
+        sample, rows, kept = campaign["sample"].to_numpy(), [], []
         for each in given.problem.objectives:
             values = numbers(campaign, each.output)
             known = used & np.isfinite(values)
-            of = np.mean if each.statistic == "mean" else each.probability
-            middle = (np.mean(values[known]) if each.statistic == "mean"
-                      else np.quantile(values[known], each.probability, method="hazen")
-                      ) if known.any() else np.nan  # fmt: skip
-            rows.append((float(middle), *placed.interval(values[known], sample[known], of)))
+            kept.append(np.where(known, values, np.nan))
+            own, of = values[known], np.mean if each.statistic == "mean" else each.probability
+            if not len(own):
+                rows.append((np.nan, np.nan, np.nan))
+            elif each.statistic == "probability":
+                count = int(each.beyond(own).sum())
+                rows.append((count / len(own), *share_interval(count, len(own))))
+            else:
+                middle = np.mean(own) if callable(of) else np.quantile(own, of, method="hazen")
+                rows.append((float(middle), *placed.interval(own, sample[known], of)))
         told = judge(campaign, given.budget.constraints, placed)
         objective, lower, upper = (np.array(rows)[:, k] for k in range(3))
+        checked = given.present.specification.check_every
+        apart = {one.name: one for one in differences(campaign)} if checked else {}
         return {
-            "objective": objective, "lower": lower, "upper": upper,
-            "short": int((~used).sum()),
+            "objective_value": objective, "objective_lower": lower, "objective_upper": upper,
+            "values": kept, "short": int((~used).sum()),
+            "compared": max((len(one.samples) for one in apart.values()), default=0),
+            "difference": [float(apart[name].apart.max()) if name in apart else np.nan
+                           for name in outputs_of(given.problem)],
             **{name: told[name].to_numpy().astype(int if name == "verdict" else float)
                for name in ("probability", "probability_lower", "verdict")},
         }  # fmt: skip

@@ -89,6 +89,8 @@ class Choices:
     """Whether more samples may follow: then nothing is merged or told as long as all goes well."""
     brief: bool = False
     """Whether nothing is told of the results: what asked for them tells what they mean."""
+    label: str = ""
+    """What progress is told of, instead of the campaign's name."""
 
 
 def run_campaign(folder: Path, choices: Choices) -> int:
@@ -169,7 +171,8 @@ def _watched(
     done, total = (int(share.holds(each).sum()) for each in (np.setdiff1d(every, open_), every))
     checks = [check_of(sample) for sample in _checks(campaign, choices)]
     progress = Progress(
-        campaign.path / f"progress-{share.writer}.json", campaign.attributes["campaign_name"],
+        campaign.path / f"progress-{share.writer}.json",
+        choices.label or campaign.attributes["campaign_name"],
         total=total, done=done, failed=mine, workers=choices.scheduler.workers,
         checks=len(checks),
     )  # fmt: skip
@@ -233,7 +236,8 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
             lines = [] if choices.brief else notes(dataset)
             if not choices.brief and (listed or campaign.scene.solver.error_bars):
                 lines += error_lines(dataset)
-            lines += check_lines(dataset) + verdict_lines(dataset)
+            if not choices.brief:
+                lines += check_lines(dataset) + verdict_lines(dataset)
             refused = too_far(dataset)
         for line in lines:
             _tell(f"  {line}")
@@ -353,6 +357,8 @@ class Order(NamedTuple):
     """Whether another order follows from the results of this one."""
     brief: bool = False
     """Whether nothing is told of the results."""
+    label: str = ""
+    """What progress is told of, instead of the campaign's name."""
 
     @property
     def solving(self) -> str:
@@ -401,7 +407,7 @@ class Order(NamedTuple):
 
     @property
     def choices(self) -> tuple[Any, ...]:
-        """All ``Choices`` but the scheduler and the last two, in their order."""
+        """All ``Choices`` but the scheduler and the last three, in their order."""
         wanted = self.campaign.specification
         again = FAILED if self.again else frozenset[Status]()
         return wanted.limits, wanted.max_failed, self.share, again, self.overrides
@@ -445,7 +451,7 @@ def _start(scheduler: Scheduler, order: Callable[[], Order], then: Callable[[Pat
             if first:
                 try:
                     made = order()
-                    placed = made.folder, (*made.choices, made.prepare(), made.brief)
+                    placed = made.folder, (*made.choices, made.prepare(), made.brief, made.label)
                 except InputError as error:
                     placed = error
             if isinstance(placed := scheduler.from_first(placed), InputError):

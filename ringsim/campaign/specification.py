@@ -1,4 +1,4 @@
-"""The campaign file: which scene, which inputs, which design, which limits."""
+"""The campaign file: which scene, inputs, design and limits; and what an optimisation adds."""
 
 import contextlib
 import json
@@ -13,7 +13,8 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from ringsim import extensions
 from ringsim.analysis import derived
-from ringsim.analysis.intervals import quantities
+from ringsim.analysis.intervals import quantities, samples_needed
+from ringsim.analysis.optimum import Objective
 from ringsim.analysis.requirements import Requirements
 from ringsim.analysis.verdicts import Condition, Looks, Rule, as_list
 from ringsim.choice import kind_of, kinds_of
@@ -36,7 +37,7 @@ from ringsim.sampling.table import (
 )
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
-from ringsim.units import Model
+from ringsim.units import ListIn, Model
 from ringsim.variables import GONE, OF_CAMPAIGNS
 
 SOLVERS = {
@@ -177,6 +178,113 @@ class Specification(Model):
     def rule(self) -> Rule | None:
         """When the campaign may end before its last sample; None if only there."""
         return Rule(conditions=self.stop_when, looks=self.looks) if self.stop_when else None
+
+
+# What an optimisation file has beyond these keys.
+
+
+class Variable(Model):
+    """What may be chosen: a scene value between two bounds."""
+
+    low: float
+    high: float
+    scale: Literal["linear", "log"] = "linear"
+    """Whether steps or ratios of the value matter."""
+    shared: Annotated[tuple[str, ...], ListIn] = ()
+    """Scene paths that all take the value, if the name is none, or not the only one."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "Variable":
+        if not self.low < self.high:
+            raise ValueError(f"low = {self.low:g} must be below high = {self.high:g}")
+        if self.scale == "log" and self.low <= 0.0:
+            raise ValueError(f'low = {self.low:g} must be above 0 for scale = "log"')
+        return self
+
+    def value(self, share: float) -> float:
+        """The value at a place between low (0) and high (1)."""
+        if self.scale == "log":
+            return float(self.low * (self.high / self.low) ** share)
+        return float(self.low + (self.high - self.low) * share)
+
+    def share(self, value: float) -> float:
+        """The place of a value."""
+        if self.scale == "log":
+            return float(np.log(value / self.low) / np.log(self.high / self.low))
+        return (value - self.low) / (self.high - self.low)
+
+
+class Aim(Model):
+    """A statistic of an output, to be made small or large."""
+
+    minimise: Literal["mean", "quantile", "probability"] | None = None
+    maximise: Literal["mean", "quantile"] | None = None
+    probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+    """Below the quantile."""
+    max: float = 0.0
+    """Of minimise = "probability": values above count."""
+    min: float = 0.0
+    """Likewise: values below count."""
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> "Aim":
+        given, what = self.model_fields_set, self.minimise or self.maximise
+        if (self.minimise is None) == (self.maximise is None):
+            raise ValueError(
+                'minimise or maximise: give one of both, = "mean" or "quantile", or minimise = '
+                '"probability"'
+            )
+        if (what == "quantile") != ("probability" in given):
+            raise ValueError("probability goes with a quantile: give both, or neither")
+        if (len(given & {"max", "min"}) == 1) != (what == "probability"):
+            raise ValueError(
+                'max or min goes with minimise = "probability", which is that of a value beyond: '
+                'give both, for example minimise = "probability", max = 10.0'
+            )
+        return self
+
+    def objective(self, output: str) -> Objective:
+        """The same for the search."""
+        sign = 1.0 if self.minimise is not None else -1.0
+        above = "min" not in self.model_fields_set
+        return Objective(
+            output, self.minimise or self.maximise or "mean", self.probability, sign,
+            self.max if above else self.min, 1.0 if above else -1.0,
+        )  # fmt: skip
+
+
+class Budget(Model):
+    """What an optimisation file has beyond the keys of a campaign file."""
+
+    variables: Annotated[
+        dict[str, Variable], BeforeValidator(lambda table: flat(table, "low")), Field(min_length=1)
+    ]
+    """What may be chosen, by scene path."""
+    objectives: Annotated[dict[str, Aim], Field(min_length=1, max_length=2)]
+    """What is made small or large, by output; two give a front."""
+    constraints: Requirements = Field(default_factory=dict)
+    """Requirements, as of a campaign file."""
+    designs: Annotated[int, Field(ge=4, le=100_000)] = 60
+    """Designs that the search runs, at most."""
+    samples: Annotated[int, Field(ge=4, le=100_000)] = 16
+    """Of each design in the search."""
+    check: Annotated[int, Field(ge=16, le=1_000_000)] = 100
+    """Fresh samples of a design that the search has found, which correct it."""
+    verdict: Annotated[int, Field(ge=16, le=10_000_000)] = 300
+    """Fresh samples of the present and of each chosen design, which judge it."""
+    front: Annotated[int, Field(ge=2, le=100)] = 5
+    """Designs along the front of two objectives."""
+
+    @model_validator(mode="after")
+    def _can_be_shown(self) -> "Budget":
+        for name, wanted in self.constraints.items():
+            if (least := samples_needed(0, wanted.probability, wanted.confidence)) > self.verdict:
+                raise ValueError(
+                    f"verdict = {self.verdict}: so few samples never show constraints.{name} with "
+                    f"probability {wanted.probability:g} and confidence {wanted.confidence:g}: set "
+                    f"verdict = {least} at least, better twice that"
+                )
+        return self
 
 
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"

@@ -220,7 +220,7 @@ def optimise_command(
     that were tried are campaigns in the same folder.  The same command goes on with one that was
     interrupted; under mpiexec or srun every rank computes, and --workers is left out.
     """
-    from ringsim.analysis.optimum import front_tables
+    from ringsim.analysis.front import front_tables
     from ringsim.campaign.optimisation import Given, optimisation_of, run_optimisation
 
     def given() -> Given:
@@ -228,7 +228,8 @@ def optimise_command(
         budget = found.budget
         click.echo(
             f"{found.table['name']}: up to {budget.designs} designs of {budget.samples} samples, "
-            f"one after the other, then verdicts of {budget.verdict} each; what has run is kept"
+            f"one after the other, checks of {budget.check}, then verdicts of {budget.verdict} "
+            "each; what has run is kept"
         )
         return found
 
@@ -272,7 +273,8 @@ def _told(
         if ended.first:
             raise ended.refused
         return EXIT_BAD_INPUT
-    if ended.first and ended.code == EXIT_DONE:
+    # All samples of the last campaign may have failed: what that means is told, too.
+    if ended.first and ended.code in (EXIT_DONE, EXIT_FAILED) and path.exists():
         found = xr.load_dataset(path)
         for table in tables(found):
             for line in ["", *table.lines()]:

@@ -13,8 +13,7 @@ from ringsim.cable.ropes import Ropes
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter, Readings
-from ringsim.frame.rods import Strains, move, moved_between, straighten
-from ringsim.frame.state import State
+from ringsim.frame.state import State, Strains, move, moved_between, straighten
 from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Array
 from ringsim.outputs.meters import Reading

@@ -13,14 +13,18 @@ from ringsim.frame.cables import Arms, FrameCables, Laws, Lines, Roped
 from ringsim.frame.elimination import Border, Fronts
 from ringsim.frame.laws import Acting, JointLaws, Openings
 from ringsim.frame.mesh import CURE, NOT_HERE, Mesh, Skeleton, mesh_of
-from ringsim.frame.rods import Pose, Strains, add_forces, move, room_for_loads
 from ringsim.frame.springs import STIFFNESS, BeamSlide, Web
 from ringsim.frame.state import (
     Coefficients,
     Followed,
     Hanging,
     Held,
+    Pose,
     State,
+    Strains,
+    add_forces,
+    move,
+    room_for_loads,
 )
 from ringsim.layout.bodies import Array
 from ringsim.layout.layout import layout_of

@@ -10,8 +10,7 @@ from ringsim.cable.chain import ChainState, work_between
 from ringsim.core.library import call
 from ringsim.frame.mesh import Indices, Mesh
 from ringsim.frame.model import FrameModel
-from ringsim.frame.rods import Strains
-from ringsim.frame.state import State
+from ringsim.frame.state import State, Strains
 from ringsim.layout.bodies import Array, OnBody, OnRod
 from ringsim.layout.points import BOOM_TIP, HUB, Where, points_of
 from ringsim.outputs.meters import Bodies, Meters, Places

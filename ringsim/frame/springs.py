@@ -8,8 +8,7 @@ import numpy as np
 
 from ringsim.frame.laws import Law, Tape, taped
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
-from ringsim.frame.rods import Pose
-from ringsim.frame.state import State
+from ringsim.frame.state import Pose, State
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.layout import Layout
 from ringsim.parts.laws import HUB as FREE

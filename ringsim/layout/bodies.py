@@ -281,7 +281,7 @@ Opening = JointOpening | ChordOpening
 def stiffness_of(rod: Rod, rods: Rods, length: float) -> Array:
     """Stiffness of u and psi of an element of a length (m), shape (6,), N/m and N m.
 
-    See ``ringsim.frame.rods`` for the strains; the shear carries the flexibility of bending
+    See ``ringsim.frame.state`` for the strains; the shear carries the flexibility of bending
     that constant curvature lacks.
     """
     young, area, second = rod.young_modulus, rod.tube.area, rod.tube.second_moment

@@ -14,7 +14,7 @@ from matplotlib.ticker import LogLocator
 from ringsim.analysis.engines import OUTPUTS
 from ringsim.analysis.stability import AGREE, ENGINES, OK, WRONG, axis_label
 from ringsim.plots import style
-from ringsim.tables import unit_behind
+from ringsim.tables import readable, unit_behind, unit_text
 
 # Error against cost: the work-precision figure of an accuracy study.
 
@@ -205,61 +205,124 @@ def _short(value: float) -> str:
 
 @style.styled
 def front(found: xr.Dataset) -> Figure:
-    """On the left what designs reach: those that were tried by few samples (blue where nothing that
-    is required is broken), and the present and the chosen ones by fresh samples with their
-    intervals; over the second objective, or over the order in which they were tried.  On the right
-    where the variables of the chosen designs lie between their bounds.
+    """On the left what designs reach: those that were tried by few samples and the checks (blue
+    where nothing that is required is broken), and the present and the chosen ones by fresh samples
+    with their intervals; over the second objective, or in the order in which they were tried.  On
+    the right where the variables of the chosen designs lie between their bounds, and how far the
+    checked quantiles lie on either side of what is required.
     """
-    variables, two = found.sizes["variable"], found.sizes["objective"] == 2
-    figure = Figure(figsize=(12.0, max(4.2, 0.5 * variables + 1.8)))
-    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
-    units = [str(u) for u in found["objective_units"].values]
-    kept = (found["tried_lost"].values == 0.0) & (found["tried_beyond"].values <= 0.0).all(axis=1)
-    tried = found["tried_objective"].values
-    order = np.arange(1, len(tried) + 1)
-    across = tried[:, 1] if two else order
-    left.scatter(across[~kept], tried[~kept, 0], s=14, facecolors="none", edgecolors=style.GREY,
-                 label="tried, breaks a constraint")  # fmt: skip
-    left.scatter(across[kept], tried[kept, 0], s=14, color=style.SKY, label="tried")
-    middle, low, high = (found[f"objective_{end}"].values for end in ("value", "lower", "upper"))
-    names = [str(name) for name in found["design"].values]
-    for k, name in enumerate(names):
-        colour = style.INK if k == 0 else style.VERMILLION
-        x = middle[k, 1] if two else len(tried) + 2 + 2 * k
-        ends = np.abs(np.array([[low[k, 0]], [high[k, 0]]]) - middle[k, 0])
-        wide = np.abs(np.array([[low[k, 1]], [high[k, 1]]]) - middle[k, 1]) if two else None
-        left.errorbar(x, middle[k, 0], yerr=ends, xerr=wide, fmt="s" if k == 0 else "D",
-                      color=colour, markersize=5, capsize=3)  # fmt: skip
-        left.annotate(name, (x, middle[k, 0]), textcoords="offset points",
-                      xytext=(0, 9 if k else -15), ha="center",
-                      fontsize=8.5, color=colour)  # fmt: skip
-    objectives = [str(name) for name in found["objective"].values]
-    left.set_ylabel(unit_behind(objectives[0], units[0]))
-    left.set_xlabel(unit_behind(objectives[1], units[1]) if two else "Design, as tried")
-    left.margins(x=0.1, y=0.1)
-    left.legend(loc="best", fontsize=8)
-    left.set_title("Tried (few samples), present and chosen (fresh samples, 95 %)", fontsize=10)
-    lowest, highest = found["low"].values, found["high"].values
-    for k in range(variables):
-        right.plot([0.0, 1.0], [k, k], color=style.GREY, linewidth=0.9)
-        for j in range(len(names)):
-            value = float(found["value"].values[j, k])
-            place = (value - lowest[k]) / (highest[k] - lowest[k])
-            right.plot(place, k, "s" if j == 0 else "D", markersize=5,
-                       color=style.INK if j == 0 else style.VERMILLION)  # fmt: skip
-            if len(names) < _MANY:
-                right.annotate(f"{value:.4g}", (place, k), textcoords="offset points",
-                               xytext=(0, 6 if j else -13), fontsize=8, ha="center")  # fmt: skip
-    known = zip(found["variable"].values, found["variable_units"].values, strict=True)
-    labels = [unit_behind(str(name), str(unit)) for name, unit in known]
-    right.set_yticks(range(variables), labels)
-    right.tick_params(axis="y", labelsize=8.5, length=0)
-    right.set_ylim(variables - 0.4, -0.7)
-    right.set_xlim(-0.06, 1.06)
-    right.set_xticks([0.0, 1.0], ["low", "high"])
-    right.set_title("Variables: present (black) and chosen", fontsize=10)
+    variables, bounds = found.sizes["variable"], found.sizes["bound"]
+    figure = Figure(figsize=(12.0, max(4.2, 0.5 * (variables + bounds) + 2.2)))
+    heights = (variables, bounds + 0.5) if bounds else (1,)
+    grid = figure.add_gridspec(len(heights), 2, width_ratios=(3, 2), height_ratios=heights)
+    _reached(figure.add_subplot(grid[:, 0]), found)
+    _variables(figure.add_subplot(grid[0, 1]), found)
+    if bounds:
+        _bounds(figure.add_subplot(grid[1, 1]), found)
     style.title(figure, f"Designs: {found.attrs['title'] or found.attrs['name']}")
     return figure
+
+
+def _look(k: int) -> dict[str, Any]:
+    """Of the present design, the first one, and of the chosen ones."""
+    return {"color": style.VERMILLION if k else style.INK, "marker": "D" if k else "s",
+            "markersize": 4.5, "linestyle": ""}  # fmt: skip
+
+
+def _reached(axes: Axes, found: xr.Dataset) -> None:
+    two, names = found.sizes["objective"] == 2, [str(name) for name in found["design"].values]
+    lost, beyond = found["tried_lost"].values, found["tried_estimate_beyond"].values
+    count = int(found.attrs["designs"])
+    kept = ((lost == 0.0) & (beyond <= 0.0).all(axis=1))[:count]
+    tried = found["tried_estimate"].values[:count]
+    across = tried[:, 1] if two else np.arange(1, count + 1)
+    axes.scatter(across[~kept], tried[~kept, 0], s=14, facecolors="none", edgecolors=style.GREY,
+                 label="tried, breaks a constraint")  # fmt: skip
+    axes.scatter(across[kept], tried[kept, 0], s=14, color=style.SKY, label="tried, keeps to all")
+    middle, low, high = (found[f"objective_{end}"].values for end in ("value", "lower", "upper"))
+    wide = 0.08 * count + 2.0
+    for k, name in enumerate(names):
+        x = middle[k, 1] if two else count + wide * (k + 1)
+        ends = [np.abs([[end[k, i]] for end in (low, high)] - middle[k, i]) for i in range(1 + two)]
+        axes.errorbar(x, middle[k, 0], yerr=ends[0], xerr=ends[1] if two else None, capsize=4,
+                      **_look(k))  # fmt: skip
+        if two:
+            axes.annotate(name, (x, middle[k, 0]), textcoords="offset points", xytext=(7, 7),
+                          fontsize=8.5, color=_look(k)["color"])  # fmt: skip
+    units = [str(unit) for unit in found["objective_units"].values]
+    words = [
+        f"{name}, {'small' if sign > 0 else 'large'} is better" for name, sign in zip(
+            found["objective"].values, found["objective_sign"].values, strict=True
+        )
+    ]  # fmt: skip
+    axes.set_ylabel(unit_behind(words[0], units[0]))
+    if two:
+        axes.set_xlabel(unit_behind(words[1], units[1]))
+    else:
+        some = sorted({1, *np.linspace(1, count, 5).round().astype(int).tolist()})
+        places = [count + wide * (k + 1) for k in range(len(names))]
+        axes.set_xticks([*some, *places], [*map(str, some), *names])
+        axes.axvline(count + 0.5 * wide, color=style.PALE)
+        axes.set_xlabel("Designs in the order in which they were tried; present and chosen")
+    axes.margins(x=0.14 if two else 0.08, y=0.12)
+    axes.legend(loc="best", fontsize=8)
+    axes.set_title("Tried (estimates), present and chosen (fresh samples, 95 %)", fontsize=10)
+
+
+def _variables(axes: Axes, found: xr.Dataset) -> None:
+    low, high = found["low"].values, found["high"].values
+    labels = [unit_behind(str(name), str(unit)) for name, unit in zip(
+        found["variable"].values, found["variable_units"].values, strict=True
+    )]  # fmt: skip
+    places = (found["value"].values - low) / (high - low)
+    told = [[f"{v:.4g}" for v in row] for row in found["value"].values]
+    _rows(axes, labels, places, told)
+    axes.set_xlim(-0.06, 1.06)
+    axes.set_xticks([0.0, 1.0], ["low", "high"])
+    axes.set_title("Variables: present (black) and chosen", fontsize=10)
+
+
+def _bounds(axes: Axes, found: xr.Dataset) -> None:
+    far = found["check_beyond"].values
+    size = np.nanmax(np.abs(far), axis=0, initial=0.0)
+    told = []
+    for row in far:
+        factors = [readable(str(u), abs(float(v))) for u, v in zip(
+            found["bound_units"].values, row, strict=True
+        )]  # fmt: skip
+        told.append([f"{factor * v:+.3g} {unit_text(unit)}".rstrip()
+                     for v, (factor, unit) in zip(row, factors, strict=True)])  # fmt: skip
+    labels = [unit_behind(str(name), str(unit)) for name, unit in zip(
+        found["bound"].values, found["bound_units"].values, strict=True
+    )]  # fmt: skip
+    _rows(axes, labels, far / np.where(size > 0.0, size, 1.0), told)
+    axes.axvline(0.0, color=style.INK, linewidth=1.1)
+    axes.set_xlim(-1.25, 1.25)
+    axes.set_xticks([-0.6, 0.0, 0.6], ["keeps to it", "bound", "breaks it"])
+    axes.tick_params(axis="x", length=0)
+    axes.set_title("Quantiles aimed at less the bounds (check samples)", fontsize=10)
+
+
+def _rows(axes: Axes, labels: list[str], places: Any, told: list[list[str]]) -> None:
+    """A row for each label, a mark for each design, with its value if there are few."""
+    for k in range(len(labels)):
+        axes.axhline(k, color=style.GREY, linewidth=0.9, zorder=1)
+        for j in range(len(places)):
+            axes.plot(places[j, k], k, **_look(j))
+            if len(places) < _MANY:
+                axes.annotate(
+                    told[j][k],
+                    (places[j, k], k),
+                    textcoords="offset points",
+                    ha="center",
+                    xytext=(0, -13 if j else 6),
+                    fontsize=8,
+                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+                )
+    axes.set_yticks(range(len(labels)), labels)
+    axes.tick_params(axis="y", labelsize=8.5, length=0)
+    axes.set_ylim(len(labels) - 0.4, -0.7)
+    axes.grid(visible=False)
 
 
 _MANY = 4

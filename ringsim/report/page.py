@@ -220,6 +220,9 @@ _MATTERS = "tornado"
 _FIRST = 3
 
 
+# The pages.
+
+
 def write_report(
     campaign: xr.Dataset, out: Path, folder: str, analysis: xr.Dataset | None = None,
     measurement: Measurement | None = None,
@@ -257,7 +260,7 @@ def page(
     values, head = values_of(campaign)
     told = sections(analysis, folder)
     matters = "matters" in told and any(each.rows for each in told["matters"].tables)
-    drawn = sorted(figures_of(campaign), key=lambda each: _turn(each[0].name))
+    pictures = sorted(figures_of(campaign), key=lambda each: _turn(each[0].name))
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
@@ -282,7 +285,7 @@ def page(
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
         "provenance": list(provenance(campaign)),
     }  # fmt: skip
-    figures = [(p.name, p.words, f) for p, f in drawn if matters or p.name != _MATTERS]
+    figures = [(p.name, p.words, f) for p, f in pictures if matters or p.name != _MATTERS]
     if measurement is not None:
         apart = residuals(campaign, measurement)
         told["measured"] = Section("measured", "Measured data", [residual_table(apart)])

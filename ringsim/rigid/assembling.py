@@ -57,7 +57,7 @@ def values_and_slopes(function: OfTwo, ends: tuple[Array, ...]) -> tuple[Array, 
 def strains(lengths: Array) -> OfTwo:
     """Strains u (m) and psi (rad) of elements with these natural lengths (m), shape (n, 6).
 
-    Those of ``ringsim.frame.rods``: u = Z R^T d - L e_x and psi = log(R_1^T R_2), with series
+    Those of ``ringsim.frame.state``: u = Z R^T d - L e_x and psi = log(R_1^T R_2), with series
     for psi, which is below 0.1 rad wherever rods hardly bend: what they leave out is below 1e-11.
     """
 

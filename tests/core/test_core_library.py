@@ -25,9 +25,8 @@ from ringsim.frame.elimination import Border, Fronts
 from ringsim.frame.laws import Acting, Tape, play, taped
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.model import FrameModel, System
-from ringsim.frame.rods import Pose, Strains
 from ringsim.frame.springs import Web
-from ringsim.frame.state import Coefficients, Followed, Held, Moving
+from ringsim.frame.state import Coefficients, Followed, Held, Moving, Pose, Strains
 from ringsim.refusal import EXIT_BAD_INPUT, NotBuiltError
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from ringsim.core.library import call
 from ringsim.frame.model import FrameModel
-from ringsim.frame.rods import Strains, move
-from ringsim.frame.state import State
+from ringsim.frame.state import State, Strains, move
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from ringsim.core.library import call
 from ringsim.frame.elimination import Fronts
 from ringsim.frame.mesh import Mesh
-from ringsim.frame.rods import (
+from ringsim.frame.state import (
     Pose,
     Strains,
     add_forces,

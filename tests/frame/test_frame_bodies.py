@@ -9,7 +9,7 @@ import pytest
 from ringsim.frame.integrate import Integration
 from ringsim.frame.mesh import tetrahedron
 from ringsim.frame.model import FrameModel
-from ringsim.frame.rods import energies_of, move, place_points
+from ringsim.frame.state import energies_of, move, place_points
 from ringsim.scene import load_scene
 
 pytestmark = pytest.mark.quick

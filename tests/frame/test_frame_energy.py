@@ -9,7 +9,7 @@ from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter
-from ringsim.frame.rods import Strains
+from ringsim.frame.state import Strains
 from ringsim.scene import load_scene
 from ringsim.stepping.instant import Passing, lost_between
 

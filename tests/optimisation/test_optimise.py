@@ -13,12 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 import xarray as xr
 from click.testing import CliRunner
 
 import ringsim
-from ringsim.campaign.optimisation import FRONT, optimisation_of
+from ringsim.analysis.front import front_tables
+from ringsim.campaign.optimisation import FRONT, fresh_verdict, optimisation_of
 from ringsim.cli import cli
+from ringsim.overrides import with_number
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
@@ -117,7 +120,7 @@ def test_numbers_of_the_front_are_those_of_its_campaigns(found):
         if scene is not None:
             assert scene.cables.lower.winch.winding.speed == speed
     assert front["short"].values.tolist() == [0, 0]
-    second = ringsim.open_campaign(out / "designs" / "002-search")
+    second = ringsim.open_campaign(sorted((out / "designs").glob("*-search"))[1])
     mean = float(second["peak_tension"].mean())
     np.testing.assert_allclose(front["tried_objective"][1, 0], mean)
     seeds = [ringsim.open_campaign(out / name)["sample_seed"].values.tolist()
@@ -143,17 +146,112 @@ def test_intervals_and_verdicts_are_those_of_an_analysis_of_the_fresh_samples(fo
         assert high - low == pytest.approx(2.0 * 2.07 * error, rel=0.25)
 
 
-def test_what_a_variable_buys_is_in_the_designs_that_were_tried(found):
-    front, _ = found
-    values = front["tried_value"].values[:, 0].tolist()
-    for k, name in enumerate(front["design"].values):
-        place = values.index(float(front["value"][k, 0]))
-        assert float(front["searched"][k, 0]) == float(front["tried_objective"][place, 0])
-        assert float(front["searched_beyond"][k, 0]) == float(front["tried_beyond"][place, 0])
-        if name != "present":  # the one variable at its present value is the present design
-            assert float(front["without"][k, 0, 0]) == float(front["searched"][0, 0])
-            assert float(front["without_beyond"][k, 0, 0]) == float(front["searched_beyond"][0, 0])
+def test_what_a_variable_buys_is_in_the_designs_that_were_tried_and_their_checks(found):
+    """The one variable at its present value is the present design: its few samples, and the shift
+    between both kinds of samples of the chosen design, by hand."""
+    front, out = found
+    place = dict(zip(front["design"].values, front["place"].values.tolist(), strict=True))
+    assert place["present"] == 0
+    few, many, present = (
+        [ringsim.open_campaign(folder)["peak_tension"].values.mean() for folder in folders]
+        for folders in (sorted((out / "designs").glob("*-search")),
+                        sorted((out / "designs").glob("*-check")), [out / "present"])
+    )  # fmt: skip
+    one = front.sel(design="design-1")
+    assert few[place["design-1"]] == pytest.approx(float(one["searched"][0]))
+    shift = float(one["check_objective"][0]) - few[place["design-1"]]
+    assert shift == pytest.approx(float(one["shift_objective"][0]))
+    assert any(float(one["check_objective"][0]) == pytest.approx(each) for each in many)
+    assert float(one["without"][0, 0]) == pytest.approx(few[0] + shift)
+    far = float(front["searched_beyond"][0, 0] + one["shift"][0])
+    assert float(one["without_beyond"][0, 0]) == pytest.approx(far)
+    assert float(one["check_beyond"][0]) == pytest.approx(
+        float(one["searched_beyond"][0] + one["shift"][0])
+    )
+    assert present[0] == pytest.approx(float(front["objective_value"][0, 0]))
     assert not front["tried_lost"].values.any()
+
+
+def test_gain_is_that_of_pairs_of_equal_samples(found):
+    front, out = found
+    first, second = (ringsim.open_campaign(out / name) for name in ("present", "design-1"))
+    assert first["sample_seed"].values.tolist() == second["sample_seed"].values.tolist()
+    apart = first["peak_tension"].values - second["peak_tension"].values
+    low, high = (float(front[f"gain_{end}"][1, 0]) for end in ("lower", "upper"))
+    assert float(front["gain"][1, 0]) == pytest.approx(apart.mean())
+    assert low < apart.mean() < high
+    assert high - low == pytest.approx(2.0 * 1.96 * apart.std() / 24**0.5, rel=0.2)
+    assert float(front["gain"][0, 0]) == 0.0
+
+
+def test_a_probability_is_the_share_of_the_fresh_samples_beyond(found, file):
+    _, out = found
+    known = ringsim.open_campaign(out / "present")["peak_tension"].values
+    middle = float(np.median(known)) + 1e-9
+    change = 'minimise = "probability", max = ' + repr(middle)
+    given = optimisation_of(FILE.replace('minimise = "mean"', change), file)
+    told = fresh_verdict(given, out / "present")
+    assert told["objective_value"].tolist() == [0.5]
+    low, high = scipy.stats.binomtest(12, 24).proportion_ci(0.95, "exact")
+    np.testing.assert_allclose(
+        [told["objective_lower"][0], told["objective_upper"][0]], [low, high]
+    )
+    [aim] = given.problem.objectives
+    assert aim.told == f"probability of peak_tension > {middle:g} N"
+
+
+def test_another_optimisation_is_refused_before_anything_runs_and_changes_nothing(found, tmp_path):
+    front, out = found
+    for old, new, words in (
+        ("seed = 4", "seed = 5", "seed = 5 instead of 4"),
+        ("verdict = 24", "verdict = 30", "verdict = 30 instead of 24"),
+        ("designs = 10", "designs = 12", "designs = 12 instead of 10"),
+        ("max = 1.6", "max = 1.7", "constraints.deployment_time.max = 1.7 instead of 1.6"),
+        ("high = 0.2", "high = 0.21", "variables.speed.high = 0.21 instead of 0.2"),
+        ('sections" = 3', 'sections" = 4', "scene.structure.sections = 4 instead of 3"),
+    ):
+        other = tmp_path / "quick.toml"
+        other.write_text(FILE.replace(old, new))
+        held = {path: path.stat().st_mtime_ns for path in out.rglob("*")}
+        done = CliRunner().invoke(cli, ["optimise", str(other), "--out", str(out)])
+        assert done.exit_code == 2
+        assert words in done.output
+        assert "--out" in done.output
+        assert {path: path.stat().st_mtime_ns for path in out.rglob("*")} == held
+    xr.testing.assert_identical(xr.load_dataset(out / FRONT), front)
+
+
+def test_a_file_in_place_of_the_folder_is_refused(file, tmp_path):
+    taken = tmp_path / "taken"
+    taken.write_text("")
+    done = CliRunner().invoke(cli, ["optimise", str(file), "--out", str(taken)])
+    assert done.exit_code == 2
+    assert "taken" in done.output
+    assert "Traceback" not in done.output
+
+
+def test_nothing_that_reaches_its_goal_is_said(tmp_path):
+    file = tmp_path / "short.toml"
+    file.write_text(FILE.replace('end_time" = 3.0', 'end_time" = 0.3'))
+    done = CliRunner().invoke(cli, ["optimise", str(file), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "none of 4 samples of the present design reaches its goal" in done.output
+    assert len(list((tmp_path / "out" / "designs").iterdir())) == 1
+
+
+def test_tables_say_what_is_broken_and_worse(found):
+    front = found[0].copy(deep=True)
+    front["check_beyond"][:] = [[0.5], [0.2]]
+    front["objective_value"][1] = front["objective_value"][0] + 1.0
+    front["without_beyond"][1] = 0.3
+    text = "\n".join(line for table in front_tables(front) for line in table.lines())
+    assert "no design that was tried surely keeps to all" in text
+    assert "design-1 is least beyond (deployment_time <= 1.6 by 0.2 s)" in text
+    assert "peak_tension (mean) design-1 is worse than the present design, and neither" in text
+    assert "deployment_time <= 1.6 by 0.3 s (design-1 itself by 0.2 s)" in text
+    front["check_beyond"][:] = [[-0.5], [-0.2]]
+    text = "\n".join(line for table in front_tables(front) for line in table.lines())
+    assert "keeps to all constraints: keep that one" in text
 
 
 def test_command_prints_what_the_file_holds_and_draws_it(found, file, monkeypatch):
@@ -175,7 +273,7 @@ def test_what_is_missing_is_run_and_nothing_else(found, file, tmp_path):
     again = tmp_path / "out"
     shutil.copytree(out, again)
     (again / FRONT).unlink()
-    shutil.rmtree(again / "present")  # the last but one: all before it is there
+    shutil.rmtree(sorted((again / "designs").glob("*-search"))[-2])  # all others are there
     kept = {path: path.stat().st_mtime_ns for path in again.rglob("*.journal")}
     xr.testing.assert_equal(ringsim.Optimisation.read(file).run(workers=0, out=again), front)
     assert all(path.stat().st_mtime_ns == time_ for path, time_ in kept.items())
@@ -205,12 +303,33 @@ REFUSED = [
     (("upper.winch.winding.speed", "upper.winch.winding.sped"), "winding.sped"),
     (('["cables.upper.winch.winding.speed"', '["structure.sections"'), "structure.sections"),
     (('["cables.upper.friction.coefficient", ', '["cables.upper.winch.winding.speed", '), "drawn"),
-    (("designs = 10", "designs = 5"), "too few for 1 variables: set designs = 8 at least"),
+    (("designs = 10", "designs = 5"), "too few for 1 variable: set designs = 8 at least"),
     (("verdict = 24", "verdict = 20"), "set verdict = 22 at least"),
     (("peak_tension", "peak_tensio"), "did you mean peak_tension"),
     (("peak_tension", "cable_tension"), "peak_tension"),
     (('minimise = "mean"', 'minimise = "quantile"'), "probability goes with a quantile"),
-    (('minimise = "mean"', 'maximise = "mean", minimise = "mean"'), "needs either"),
+    (('minimise = "mean"', 'maximise = "mean", minimise = "mean"'), "minimise or maximise: give"),
+    (('minimise = "mean"', 'minimise = "probability"'), 'minimise = "probability", max = 10.0'),
+    (('minimise = "mean"', 'maximise = "probability"'), "must be 'mean' or 'quantile'"),
+    (('name = "quick"\n', ""), "name is missing"),
+    (('name = "quick"', "name = 4"), "name = 4 must be text in quotes"),
+    (("seed = 4", 'seed = "x"'), 'seed = "x" must be a whole number'),
+    (("seed = 4", "seed = [1]"), "seed = [1] must be a whole number"),
+    (("seed = 4", "seed = 2.7"), "seed = 2.7 must be a whole number"),
+    (("seed = 4", "seed = -4"), "seed = -4 must be at least 0"),
+    (("designs = 10", "desins = 10"), "desins is not a known key (did you mean designs?)"),
+    (("high = 0.2", "high = 1e9"), "variables.speed.high: "),
+    (("shared = [\"cables.upper.winch", "#"), "speed is no scene path: give those"),
+    (("deployment_time = {", "peak_motor_torque = {"), "constraints.peak_motor_torque: runs of"),
+    (('peak_tension = { minimise = "mean" }', ""), "objectives must have 1 or more entries"),
+    (('"cables.lower.winch.winding.speed"]', '"cables.upper.winch.winding.speed"]'), "before"),
+    (("[objectives]", '[variables."solver.restarts"]\nlow = 1.0\nhigh = 9.0\n[objectives]'),
+     "whole number, and variables have decimals"),
+    (("[objectives]", '[variables."cables.upper.winch.winding.speed"]\nlow = 0.1\nhigh = 0.2\n'
+      "[objectives]"), "is also set by variable speed: leave out one"),
+    (("[objectives]", '[variables.a]\nlow = 0.1\nhigh = 0.6\nshared = ["joints.vjoint.viscous"]\n'
+      '[variables.b]\nlow = 0.1\nhigh = 0.6\nshared = ["joints.vjoint.viscous[2]"]\n[objectives]'),
+     "is also set by variable a: leave out one"),
     (("designs = 10", "designs = 10\nfront = 3"), "one objective has one best design"),
     (("designs = 10", 'designs = 10\ndesign = { kind = "random", samples = 3 }'), "leave it out"),
     (("[constraints]", "[requirements]"), "calls them constraints"),
@@ -250,6 +369,32 @@ def test_ranks_of_mpi_find_the_same(found, file, tmp_path):
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("wrote ") == 1
     xr.testing.assert_equal(xr.load_dataset(tmp_path / "out" / FRONT), front)
+
+
+def test_friction_of_chosen_pulleys_may_be_a_variable(file):
+    text = FILE.replace(', "cables.lower.friction.coefficient"', "").replace(
+        "designs = 10", "designs = 30"
+    )
+    text = text.replace(
+        "[objectives]",
+        """[variables.cables.lower.friction.coefficient]
+    "section 2 V" = { low = 1e-4, high = 1e-3 }
+
+    [variables."cables.lower.friction.coefficient[2]"]
+    low = 1e-4
+    high = 1e-3
+
+    [objectives]""",
+    )
+    given = optimisation_of(text, file)
+    scene = given.present.scene
+    [place] = [k for k in range(1, 7) if with_number(
+        scene, 'cables.lower.friction.coefficient["section 2 V"]').endswith(f"[{k}]")]  # fmt: skip
+    values = given.settings_of(np.array([0.5, 0.0, 1.0]))
+    told = scene.with_values(values).cables.lower.friction.coefficient
+    assert (told[place - 1], told[1]) == (1e-4, 1e-3)
+    others = [told[k] for k in range(len(told)) if k not in (place - 1, 1)]
+    assert others == [scene.cables.lower.friction.coefficient] * len(others)
 
 
 def test_budget_can_be_set_in_the_call(file):

@@ -103,7 +103,7 @@ typedef struct {
     I unknowns;
 } Mesh;
 
-/* ringsim.frame.rods */
+/* ringsim.frame.state */
 typedef struct {
     Reals place, axes, angle;
 } Pose;

@@ -1,6 +1,6 @@
 /* Elastic rods and masses, four elements at a time: forces, energies and tangent.
 
-   Formulas: ringsim/frame/rods.py, and docs/theory/rods.md. */
+   Formulas: ringsim/frame/state.py, and docs/theory/rods.md. */
 
 #include "core.h"
 
