@@ -231,7 +231,7 @@ def _designs(found: "xr.Dataset") -> Table:
         values, unit = _in_units(
             found["difference"].values[:, k], str(found["output_units"].values[k])
         )
-        what = f"{name}{unit}: full engine less or more by, at most"
+        what = f"{name}{unit}: largest difference of the engines"
         rows.append((what, *("-" if np.isnan(v) else f"{v:.2g}" for v in values)))
     return Table(("", *names), rows, _notes(found, names))
 

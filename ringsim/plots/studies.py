@@ -240,7 +240,7 @@ def _reached(axes: Axes, found: xr.Dataset) -> None:
                  label="tried, breaks a constraint")  # fmt: skip
     axes.scatter(across[kept], tried[kept, 0], s=14, color=style.SKY, label="tried, keeps to all")
     middle, low, high = (found[f"objective_{end}"].values for end in ("value", "lower", "upper"))
-    wide = 0.08 * count + 2.0
+    wide = 0.15 * count + 1.0
     for k, name in enumerate(names):
         x = middle[k, 1] if two else count + wide * (k + 1)
         ends = [np.abs([[end[k, i]] for end in (low, high)] - middle[k, i]) for i in range(1 + two)]
