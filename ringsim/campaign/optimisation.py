@@ -12,7 +12,7 @@ import tomli_w
 import xarray as xr
 from pydantic import ValidationError
 
-from ringsim import build
+from ringsim import build, extensions
 from ringsim.analysis.design import endings_of, placement
 from ringsim.analysis.engines import differences
 from ringsim.analysis.front import Axis, gains, outputs_of, write_front
@@ -50,7 +50,7 @@ from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted, readable, unit_text
 from ringsim.units import unit_at
-from ringsim.variables import GOALS, Fate, Status
+from ringsim.variables import GOALS, OF_CAMPAIGNS, Fate, Status
 
 FRONT = "front.nc"
 """The result of an optimisation, in its folder."""
@@ -170,6 +170,7 @@ def optimisation_of(
     if strange := [key for key in table if key not in known and key not in Specification.gone]:
         hint = known_or_nearest(strange[0], sorted(known))
         raise InputError(f"{path.name}: {strange[0]} is not a known key ({hint})")
+    extensions.load(extensions.located(extensions.names_in(table), path.parent))
     own = {name: table.pop(name) for name in Budget.model_fields if name in table}
     table.setdefault("fidelity", "frame")
     for model, part in (
@@ -233,7 +234,7 @@ def _require_output(file: str, name: str, scene: Scene) -> None:
     if name not in quantities():
         hint = known_or_nearest(name, quantities())
         raise InputError(f"{file}: objectives.{name}: is no output that has a mean ({hint})")
-    if absent := sorted(set(VARIABLES[name].needs) - holds(scene)):
+    if absent := sorted(set(VARIABLES[name].needs) - holds(scene) - {OF_CAMPAIGNS}):
         raise InputError(
             f"{file}: objectives.{name}: runs of this scene do not have this output, because the "
             f"scene has no {absent[0]}: choose another, or add that to the scene"

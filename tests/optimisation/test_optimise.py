@@ -18,6 +18,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 import ringsim
+from ringsim.analysis import derived
 from ringsim.analysis.front import front_tables
 from ringsim.campaign.optimisation import FRONT, fresh_verdict, optimisation_of
 from ringsim.cli import cli
@@ -401,3 +402,19 @@ def test_budget_can_be_set_in_the_call(file):
     given = optimisation_of(FILE, file, {"designs": 20, "verdict": 50, "solver.step": 0.02})
     assert (given.budget.designs, given.budget.verdict) == (20, 50)
     assert given.present.scene.solver.step == 0.02
+
+
+def test_outputs_by_expressions_are_objectives_and_constraints():
+    """And of the file that has them alone."""
+    own = '[outputs]\npull = "max(cable_tension)"\nlag = "difference(lock_time)"\n'
+    text = FILE.replace("peak_tension = {", "pull = {").replace(
+        "[constraints]\n",
+        "[constraints]\nlag = { max = 1.0, probability = 0.9, confidence = 0.9 }\n",
+    )
+    given = optimisation_of(f"{text}\n{own}", Path("quick.toml"))
+    assert [*given.budget.objectives] == ["pull"]
+    assert given.present.specification.outputs.keys() == {"pull", "lag"}
+    assert "lag" in given.present.specification.requirements
+    with pytest.raises(InputError, match=r"lag|pull"):
+        optimisation_of(text, Path("quick.toml"))
+    derived.forget(derived.declared())
