@@ -83,7 +83,7 @@ def test_an_input_of_a_path_may_be_followed_place_by_place() -> None:
         ({"table": [["A", 1e5], [200.0, 2e5]]}, "all words, or all numbers"),
         ({"table": [["A", 1e5], ["A", 2e5]], "input": "lot"}, "stands there twice"),
         ({"table": [["A", 1e5], ["C", 2e5]], "input": "lot"}, 'no row for "B"'),
-        ({"table": [[200.0, 1e5]]}, "at least 2"),
+        ({"table": [[200.0, 1e5]]}, "must have 2 or more entries"),
         ({"table": [[200.0, -1e5], [320.0, 1e5]]}, "axial_stiffness"),
         ({"shared": ["rods.density"]}, "give each path a function of its own"),
     ],
