@@ -59,6 +59,7 @@ def scene_of(name: str) -> Scene:
 
 
 DEAR = {
+    "one-section-tension-feedback",
     "ring-of-5-slow-last-lock", "arc-of-4-wound-from-both-ends", "heavy-ring-of-4-hard-stops",
 }  # fmt: skip
 """By default frames run them, for a fifth of the price; their bars are made by the same code."""

@@ -74,6 +74,7 @@ def test_whatever_breaks_in_a_run_is_a_status(monkeypatch: pytest.MonkeyPatch) -
     assert (found.status, found.cause) == (Status.ERROR, Cause.EXCEPTION)
 
 
+@pytest.mark.slow
 def test_error_bars_cover_the_difference_of_the_engines() -> None:
     quick = {  # the end of a deployment within half a second: two runs by each engine
         "structure.opening_angle": 165.0, "joints.vjoint.viscous": 0.1, "solver.tolerance": 4e-3,

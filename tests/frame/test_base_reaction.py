@@ -204,7 +204,7 @@ LOCKING: dict[str, Any] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("by", [by_frames, by_exudyn])
+@pytest.mark.parametrize("by", [by_frames, pytest.param(by_exudyn, marks=pytest.mark.slow)])
 def test_impulses_do_not_tell_how_long_a_run_waits(by: Callable[[Scene], Outcome]) -> None:
     """Loads press the joints on their latches to the end."""
     scene = ring(**LOCKING)

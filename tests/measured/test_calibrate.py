@@ -200,6 +200,7 @@ def command(*words):
     return [sys.executable, "-m", "ringsim", "calibrate", *map(str, words)]
 
 
+@pytest.mark.slow
 def test_killed_in_a_stage_and_finished_by_other_workers_it_is_the_same(
     test_files, found, tmp_path
 ):

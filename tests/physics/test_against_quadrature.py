@@ -58,6 +58,7 @@ def test_published_cases_deploy_when_the_quadrature_says(force: float) -> None:
     assert found.locks.max() == pytest.approx(ideal_time(found.scene), rel=AGREEMENT)
 
 
+@pytest.mark.slow
 def test_stiffer_rods_lock_closer_to_the_ideal_ring() -> None:
     """Near 180 deg the width hardly depends on the angle, w = 2 l sin(angle / 2), so a strain e
     lets the angles differ by about sqrt(8 e): the spread of lock times falls by 10 for a

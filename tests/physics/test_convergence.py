@@ -68,6 +68,7 @@ def refined(kind: str, young_modulus: float, counts: tuple[int, ...]) -> Array:
     return np.abs(np.diff(angles))
 
 
+@pytest.mark.slow
 def test_refining_geometrically_exact_rods() -> None:
     """Second order or better, shown with rods soft enough for their own inertia to matter."""
     coarse, fine = refined("geometrically-exact", 1e9, (1, 2, 4))

@@ -74,7 +74,9 @@ const waiting = setInterval(() => {
 
 
 @pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
-@pytest.mark.parametrize(("width", "computed"), [(1000, False), (500, True)])
+@pytest.mark.parametrize(
+    ("width", "computed"), [(1000, False), pytest.param(500, True, marks=pytest.mark.slow)]
+)
 def test_the_page_plays_offline(
     tmp_path: Path, width: int, computed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
