@@ -124,7 +124,7 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
         variable = file.createVariable(column.name, kind, dims, **options)
         role = "input" if column.path or column.input else "label"
         variable.long_name = f"{role} {column.path or column.name}"
-        if column.has_numbers:
+        if column.has_numbers and column.path:  # nothing tells the unit of what others follow
             variable.units = column.units
         variable.setncatts(
             {"path": column.path, "role": role, "distribution": column.origin}

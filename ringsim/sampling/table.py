@@ -116,7 +116,7 @@ def draw(
     taken, before = {*VARIABLES, *COORDINATES, *_NAMED_ALREADY}, list[str]()
     for column in columns:
         if column.name in taken:
-            where = column.path or f"label {column.name}"
+            where = column.path or column.input or f"label {column.name}"
             raise InputError(f"inputs: {where} would have the name {column.name}, which is in use")
         if lost := first_inside(column.path, before):
             raise InputError(

@@ -98,6 +98,9 @@ with np.errstate(all="ignore"):
         "max(difference(lock_time, over='plane'))": np.abs(LOCK[:, 0] - LOCK[:, 1]).max(1),
         "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))":
             np.nan_to_num(np.abs(ANGLE[:, 0] - ANGLE[:, 1])).max((1, 2)),
+        "max(abs(asynchrony - asynchrony(time=0)))":
+            np.nan_to_num(np.abs(ASYNC - ASYNC[:, :1])).max(1),
+        "asynchrony(time=0.3) - asynchrony(time=0.1)": ASYNC[:, 3] - ASYNC[:, 1],
         "argmax(asynchrony)": _X["time"][np.nan_to_num(ASYNC, nan=-1.0).argmax(1)],
         "argmin(lock_time, over='section')": _X["section"][LOCK.min(1).argmin(1)],
         "integral(asynchrony)": np.array([np.trapezoid(a[np.isfinite(a)], dx=0.1)

@@ -39,6 +39,7 @@ def test_they_are_their_tables_of_what_was_drawn(tmp_path: Path) -> None:
     cold, lot = found["temperature"].values, found["lot"].values
     assert 220.0 < cold.min() < cold.max() < 310.0
     assert set(lot) == {"A", "B"}
+    assert "units" not in found["temperature"].attrs  # nobody has told one
     lower = found["cables_lower_axial_stiffness"].values
     np.testing.assert_allclose(lower, np.interp(cold, *np.transpose(TABLE)), rtol=1e-15)
     upper = found["cables_upper_axial_stiffness"].values
