@@ -468,9 +468,8 @@ def _selected(values: xr.DataArray, dim: str, wanted: Any) -> xr.DataArray:
             along = values[dim].to_numpy()
             low, high = max(wanted[0], along[0]), min(wanted[1], along[-1])
             inside = along[(along > low) & (along < high)]
-            return values.interp(time=np.unique([low, *inside, high]))
-        # Its time goes, or values at others could not be compared with it.
-        return values.interp(time=wanted).drop_vars("time")
+            wanted = np.unique([low, *inside, high])
+        return values.interp(time=wanted)
     if isinstance(wanted, tuple):
         places = values[dim].to_numpy()
         return values.isel({dim: np.flatnonzero((places >= wanted[0]) & (places <= wanted[1]))})
