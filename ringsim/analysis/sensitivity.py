@@ -346,21 +346,21 @@ class Change(NamedTuple):
     """What of its distribution is another."""
     values: str
     """That as drawn, and as it would be, with unit."""
-    weights: Array
-    """Of each sample the ratio of the new to the old density, shape (samples,)."""
+    variable: str
+    """The dataset's name of it."""
+    laws: tuple[Distribution, Distribution]
+    """As drawn, and as it would be; the same at all places of an input that has many."""
 
 
 def changes(campaign: xr.Dataset, step: float = STEP) -> tuple[list[Change], dict[str, list[str]]]:
     """The distribution of each input with one parameter changed by ``step``, and what samples do
     not tell, by the reason.
-
-    An input of many places has the same distribution in all of them: its weight is the product.
     """
     pairs = campaign_file(campaign).get("correlations", [])
     correlated = {name for pair in pairs for name in pair["between"]}
     found, left = list[Change](), dict[str, list[str]]()
     for variable in (campaign[name] for name in inputs(campaign)):
-        name, values, units = called(variable), variable.to_numpy(), variable.attrs.get("units")
+        name, units = called(variable), str(variable.attrs.get("units", "1"))
         if variable.attrs.get("path") == "solver.error_bars":
             continue
         try:
@@ -371,19 +371,16 @@ def changes(campaign: xr.Dataset, step: float = STEP) -> tuple[list[Change], dic
         if name in correlated:
             left.setdefault("correlated with another input", []).append(name)
             continue
-        count, everywhere = len(found), ""
-        if values.ndim > 1:
-            everywhere = f" at all {values.shape[1]} {place_called(variable)}s"
+        places, count = "", len(found)
+        if variable.ndim > 1:
+            places = f" at all {variable.shape[1]} {place_called(variable)}s"
         for of, before, after, other in _moved(law, step):
-            ratio = log_ratio(law, other, values)
-            if np.isnan(ratio).any():
-                continue
             digits = max(digits_of(*sorted(pair)) for pair in zip(before, after, strict=True))
-            unit = "1" if of.startswith("probability") else str(units or "1")
-            told = (" .. ".join(with_unit(fine_text(v, digits), unit) for v in each)
-                    for each in (before, after))  # fmt: skip
-            weights = np.exp(np.minimum(ratio, 700.0))
-            found.append(Change(name, of + everywhere, " -> ".join(told), weights))
+            unit = "1" if isinstance(law, Discrete) else units
+            told = (" .. ".join(with_unit(fine_text(value, digits), unit) for value in values)
+                    for values in (before, after))  # fmt: skip
+            both, own = (law, other), str(variable.name)
+            found.append(Change(name, of + places, " -> ".join(told), own, both))
         if isinstance(law, Uniform):
             left.setdefault("the mean: no samples beyond the bounds", []).append(name)
         elif len(found) == count:
@@ -445,9 +442,14 @@ def ratio_of(
         return found, [(low + (high - low) * a, low + (high - low) * b) for a, b in shares]
     bend, free = 0.0, float(min(own.sum(), count - own.sum()) - 1)
     if replicate is not None:
-        left = (replicate != each for each in np.unique(replicate))
-        each = [weights[rows & own].mean() / weights[rows].mean() for rows in left]
-        error, free = float(jackknife_error(np.array(each))), len(each) - 1.0
+        part = np.unique(replicate, return_inverse=True)[1]
+        of_own, count_own, of_all, count_all = (
+            row.sum() - np.bincount(part, row)
+            for row in (weights * own, 1.0 * own, weights, np.ones(count))
+        )
+        left = of_own / np.maximum(count_own, 1.0) * count_all / of_all
+        left = np.where(count_own > 0, left, np.nan)  # where one replicate has all of them
+        error, free = float(jackknife_error(left)), len(left) - 1.0
     else:
         apart = own * (scaled - found) / own.mean() - found * (scaled - 1.0)
         error = float(np.sqrt(np.mean(apart**2) / (count - 1)))
@@ -478,8 +480,9 @@ def rarer(
     """
     if not requirements or not placed.population:
         return xr.Dataset()
-    found, left = changes(campaign, step)
-    if not has_share_intervals(placed):
+    if has_share_intervals(placed):
+        found, left = changes(campaign, step)
+    else:
         least = LEAST_REPLICATES if placed.kind in SOBOL else 8
         found, left = [], {f"needs design.replicates = {least}": ["any input"]}
     held = good(campaign)
@@ -489,18 +492,20 @@ def rarer(
     # Of both sides to which a mean may move at most one is told.
     chance = chance_of_each(max(1, len({each[:2] for each in found})))
     normal = -float(scipy.special.ndtri(chance / 2))
-    for k, (name, wanted) in enumerate(requirements.items()):
-        own = violations(campaign, name, wanted)[held]
-        for n, each in enumerate(found):
-            weights = each.weights[held]
-            if decisive_of_share(own, weights) < LEAST_OF_SHARE:
+    broken = [violations(campaign, *each)[held] for each in requirements.items()]
+    for n, each in enumerate(found):
+        logarithm = log_ratio(*each.laws, campaign[each.variable].to_numpy()[held])
+        weights = np.exp(np.minimum(logarithm, 700.0))
+        for k, own in enumerate(broken):
+            # No number here exceeds a missing one; all are alike if no sample has a word.
+            if not (decisive_of_share(own, weights) >= LEAST_OF_SHARE and np.ptp(weights) > 0.0):
                 continue
             ratio, (ends, wide) = ratio_of(own, weights, replicate, [1.0 - LEVEL, chance])
             told[k, n] = ratio, *ends
             # The scatter of all weights, since those of few violations may be alike by chance.
             scatter = float((weights / weights.mean()).std())
             most = normal * scatter * (1.0 / own.sum() - 1.0 / len(own)) ** 0.5
-            listed[k, n] = abs(ratio - 1.0) > most and not wide[0] <= 1.0 <= wide[1]
+            listed[k, n] = abs(ratio - 1.0) > most and (wide[0] > 1.0 or wide[1] < 1.0)
     words = "factor of the probability of violating the requirement if an input has another one"
     untold = "; ".join(f"{', '.join(names)} ({why})" for why, names in left.items())
     says = "input whose distribution is another", "what of it", "as drawn, and as it would be"
@@ -546,8 +551,7 @@ def rarer_table(analysis: xr.Dataset) -> Table:
             best.setdefault(which[k][:2], k)
         kept = [k for k in best.values() if one["change_listed"].values[k]]
         kept.sort(key=lambda k: -abs(ratio[k] - 1.0))
-        if not kept:
-            quiet.append(name)
+        quiet += [name] * (not kept)
         if len(kept) > _MOST_CHANGES:
             more.append(f"{name} {len(kept) - _MOST_CHANGES}")
         for n, k in enumerate(kept[:_MOST_CHANGES]):
@@ -570,8 +574,11 @@ def rarer_table(analysis: xr.Dataset) -> Table:
         )
     if more:
         notes.append(f"further significant changes: {', '.join(more)}")
-    if quiet:
-        notes.append(f"no change of one distribution matters significantly to {', '.join(quiet)}")
+    if quiet and which:
+        notes.append(
+            "no significant change, by any one distribution, of the probability of violating "
+            f"{', '.join(quiet)}"
+        )
     if few:
         notes.append(
             "too few samples to tell what would make violations rarer (at least "
