@@ -368,6 +368,8 @@ def changes(campaign: xr.Dataset, step: float = STEP) -> tuple[list[Change], dic
         except InputError:
             left.setdefault("listed in a file", []).append(name)
             continue
+        if variable.dtype.kind not in "iuf" and not isinstance(law, Discrete):
+            continue  # words have no density
         if name in correlated:
             left.setdefault("correlated with another input", []).append(name)
             continue
@@ -461,7 +463,8 @@ def ratio_of(
 
     far = [float(scipy.special.stdtrit(free, 1.0 - each / 2)) for each in errors]
     return found, [
-        (max(0.0, found - error * straight(t)), found - error * straight(-t)) for t in far
+        (float(np.maximum(0.0, found - error * straight(t))), found - error * straight(-t))
+        for t in far
     ]
 
 
@@ -485,6 +488,8 @@ def rarer(
     else:
         least = LEAST_REPLICATES if placed.kind in SOBOL else 8
         found, left = [], {f"needs design.replicates = {least}": ["any input"]}
+    if not found and not left:  # nothing was drawn
+        return xr.Dataset()
     held = good(campaign)
     replicate = placed.replicate_of(campaign["sample"].to_numpy()[held])
     told = np.full((len(requirements), len(found), 3), np.nan)
@@ -507,7 +512,8 @@ def rarer(
             most = normal * scatter * (1.0 / own.sum() - 1.0 / len(own)) ** 0.5
             listed[k, n] = abs(ratio - 1.0) > most and (wide[0] > 1.0 or wide[1] < 1.0)
     words = "factor of the probability of violating the requirement if an input has another one"
-    untold = "; ".join(f"{', '.join(names)} ({why})" for why, names in left.items())
+    why = "; ".join(f"{', '.join(names)} ({each})" for each, names in left.items())
+    untold = np.array(why, dtype=object)  # so that files take it as text
     says = "input whose distribution is another", "what of it", "as drawn, and as it would be"
     texts = {
         f"change_{Change._fields[k]}": (
@@ -523,7 +529,7 @@ def rarer(
                 (*dims, "bound"), told[..., 1:], about(f"95 % interval of the {words}"),
             ),
             "change_listed": (dims, listed, about("whether chance does not explain it")),
-            "change_untold": ((), untold, {"long_name": "what is not told of inputs, and why"}),
+            "change_untold": ((), untold, {"long_name": "what is not tried, and why"}),
         },
         coords={"requirement": np.array([*requirements], dtype=object)},
     )  # fmt: skip

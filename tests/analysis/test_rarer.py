@@ -212,7 +212,7 @@ def test_the_table_tells_it_as_reweighting_does():
     found = analyse(one, limited(17.8), {"force": NORMAL | {"standard_deviation": 0.45}})
     event = found.reweighted_share.sel(event="asynchrony_max <= 17.8 deg").item()
     cells = [re.split(r" {2,}", line.strip()) for line in told(found)]
-    rows = [each[-6:] for each in cells if len(each) > 5 and " -> " in each[-4]]
+    rows = [each[-6:] for each in cells if len(each) > 5 and "-> " in each[-4]][1:]
     changed = {tuple(row[:2]): row[2:] for row in rows}
     before, after = float((one.asynchrony_max > 17.8).mean()), 1.0 - event
     values, chance, change, ends = changed["force", "standard deviation"]
