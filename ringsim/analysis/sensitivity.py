@@ -424,14 +424,14 @@ def _moved(
 
 
 def ratio_of(
-    own: Mask, weights: Array, replicate: Replicate, errors: Sequence[float]
+    own: Mask, weights: Array, replicate: Replicate, errors: Sequence[float], *, sobol: bool = False
 ) -> tuple[float, list[Interval]]:
     """By what the probability of what happened to ``own`` samples is multiplied with weights, shape
     (samples,), and for each of ``errors`` an interval that misses it with that probability.
 
-    Of independent samples by the linearised variance with Hall's correction for its skewness and
-    Student's t; of replicates by their jackknife; of weights that take two values the exact one of
-    the share of either among ``own``.
+    By Student's t with Hall's correction for skewness, of the linearised variance of independent
+    samples, or of the jackknife over replicates (of Sobol' points of the larger one); of weights
+    that take two values the exact one of the share of either among ``own``.
     Sources: Owen, Monte Carlo theory, methods and examples (2013), section 9.2; Hall, J. Royal
     Statistical Society B 54 (1992) 221.
     """
@@ -442,7 +442,10 @@ def ratio_of(
         upper = int(np.sum(weights[own] > two.mean()))
         shares = [share_bounds(upper, int(own.sum()), 1.0 - each / 2) for each in errors]
         return found, [(low + (high - low) * a, low + (high - low) * b) for a, b in shares]
-    bend, free = 0.0, float(min(own.sum(), count - own.sum()) - 1)
+    free = float(min(own.sum(), count - own.sum()) - 1)
+    apart = own * (scaled - found) / own.mean() - found * (scaled - 1.0)
+    error = float(np.sqrt(np.mean(apart**2) / (count - 1)))
+    bend = float(np.mean(apart**3) / np.mean(apart**2) ** 1.5 / np.sqrt(count))
     if replicate is not None:
         part = np.unique(replicate, return_inverse=True)[1]
         of_own, count_own, of_all, count_all = (
@@ -451,21 +454,14 @@ def ratio_of(
         )
         left = of_own / np.maximum(count_own, 1.0) * count_all / of_all
         left = np.where(count_own > 0, left, np.nan)  # where one replicate has all of them
-        error, free = float(jackknife_error(left)), len(left) - 1.0
-    else:
-        apart = own * (scaled - found) / own.mean() - found * (scaled - 1.0)
-        error = float(np.sqrt(np.mean(apart**2) / (count - 1)))
-        bend = float(np.mean(apart**3) / np.mean(apart**2) ** 1.5 / np.sqrt(count))
+        # Of Sobol' points the jackknife alone held the truth in as few as 87 of 100 campaigns.
+        error, free = float(np.maximum(error * sobol, jackknife_error(left))), len(left) - 1.0
 
-    def straight(far: float) -> float:
-        """Where a Student's t without skewness becomes what the samples' own has."""
-        return 3.0 / bend * (np.cbrt(1.0 + bend * (far - bend / 6.0)) - 1.0) if bend else far
-
-    far = [float(scipy.special.stdtrit(free, 1.0 - each / 2)) for each in errors]
-    return found, [
-        (float(np.maximum(0.0, found - error * straight(t))), found - error * straight(-t))
-        for t in far
-    ]
+    far = scipy.special.stdtrit(free, 1.0 - np.array(errors) / 2) * np.array([[1.0], [-1.0]])
+    if bend:  # where Student's t without skewness becomes one with it
+        far = 3.0 / bend * (np.cbrt(1.0 + bend * (far - bend / 6.0)) - 1.0)
+    low, high = found - error * far
+    return found, list(zip(np.maximum(0.0, low).tolist(), high.tolist(), strict=True))
 
 
 def rarer(
@@ -505,12 +501,16 @@ def rarer(
             # No number here exceeds a missing one; all are alike if no sample has a word.
             if not (decisive_of_share(own, weights) >= LEAST_OF_SHARE and np.ptp(weights) > 0.0):
                 continue
-            ratio, (ends, wide) = ratio_of(own, weights, replicate, [1.0 - LEVEL, chance])
+            ratio, (ends, wide) = ratio_of(
+                own, weights, replicate, [1.0 - LEVEL, chance], sobol=placed.kind in SOBOL
+            )
             told[k, n] = ratio, *ends
-            # The scatter of all weights, since those of few violations may be alike by chance.
-            scatter = float((weights / weights.mean()).std())
-            most = normal * scatter * (1.0 / own.sum() - 1.0 / len(own)) ** 0.5
-            listed[k, n] = abs(ratio - 1.0) > most and (wide[0] > 1.0 or wide[1] < 1.0)
+            # The scatter among all samples, since few violations may be alike by chance; of the
+            # logarithm, which has the shorter tails.
+            apart = logarithm if np.isfinite(logarithm).all() else weights
+            most = normal * float(apart.std()) * (1.0 / own.sum() - 1.0 / len(own)) ** 0.5
+            far = abs(float(apart[own].mean() - apart.mean())) > most
+            listed[k, n] = far and (wide[0] > 1.0 or wide[1] < 1.0)
     words = "factor of the probability of violating the requirement if an input has another one"
     why = "; ".join(f"{', '.join(names)} ({each})" for each, names in left.items())
     untold = np.array(why, dtype=object)  # so that files take it as text
@@ -578,8 +578,7 @@ def rarer_table(analysis: xr.Dataset) -> Table:
             "violations; the interval is that of the change, not of the probability as drawn; by "
             f"chance alone, fewer than one requirement in 20 would be listed ({count} tried)"
         )
-    if more:
-        notes.append(f"further significant changes: {', '.join(more)}")
+    notes += [f"further significant changes: {', '.join(more)}"] * bool(more)
     if quiet and which:
         notes.append(
             "no significant change, by any one distribution, of the probability of violating "
@@ -587,11 +586,11 @@ def rarer_table(analysis: xr.Dataset) -> Table:
         )
     if few:
         notes.append(
-            "too few samples to tell what would make violations rarer (at least "
-            f"{LEAST_OF_SHARE:g} that violate and as many that do not): {', '.join(few)}"
+            f"too few samples to tell what would make violations rarer ({LEAST_OF_SHARE:g} that "
+            f"violate and as many that do not are needed): {', '.join(few)}"
         )
-    if (rows or quiet) and (untold := analysis["change_untold"].item()):
-        notes.append(f"not tried: {untold}")
+    untold = analysis["change_untold"].item()
+    notes += [f"not tried: {untold}"] * bool(untold and (rows or quiet))
     head = ("what changes a probability", "input", "its", "from -> to", "probability", "change",
             "95 % interval")  # fmt: skip
     return marked(Table(head, rows, notes, left=3), analysis, 1)
