@@ -40,7 +40,7 @@ from ringsim.choice import kind_of
 from ringsim.files import parse_toml
 from ringsim.overrides import parse_value
 from ringsim.refusal import InputError, explain, known_or_nearest, show
-from ringsim.sampling.distributions import Discrete, Distribution, inside
+from ringsim.sampling.distributions import Discrete, Distribution, Values, inside
 from ringsim.sampling.table import AnyDistribution
 from ringsim.stepping.instant import Array
 from ringsim.units import Model
@@ -346,10 +346,18 @@ def weights_of(
             )
         values, old = known[path].to_numpy(), _drawn_from(campaign, path, known[path])
         _check_cover(path, old, new, len(values))
-        ratio = new.log_density(values) - old.log_density(values)
-        logarithm += ratio if ratio.ndim == 1 else ratio.sum(axis=1)
-        pairs[path] = Pair(old, new, ratio[:1].size)
+        logarithm += log_ratio(old, new, values)
+        pairs[path] = Pair(old, new, values[:1].size)
     return np.exp(np.minimum(logarithm, 700.0)), pairs
+
+
+def log_ratio(old: Distribution, new: Distribution, values: Values) -> Array:
+    """Logarithm of the new over the old density, shape (samples,); of values with many places,
+    which are independent, the sum over these.  NaN where there is neither density.
+    """
+    with np.errstate(invalid="ignore"):
+        ratio = new.log_density(values) - old.log_density(values)
+    return ratio if ratio.ndim == 1 else np.asarray(ratio.sum(axis=1))
 
 
 def _drawn_from(campaign: xr.Dataset, path: str, variable: xr.DataArray) -> Distribution:

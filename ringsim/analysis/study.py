@@ -43,7 +43,7 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.requirements import Requirement, read_requirements, required_by
 from ringsim.analysis.reweighting import read_distributions, reweight
-from ringsim.analysis.sensitivity import sensitivity
+from ringsim.analysis.sensitivity import rarer, sensitivity
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge, stopping_lines
 from ringsim.analysis.worst import (
@@ -147,7 +147,7 @@ def analyse(
     more = [outcomes(stand, placed), matter, *([cases(campaign)] if single else [])]
     more += [worst(stand, wanted, matter), margins(campaign)]
     more += [judge(stand, wanted, placed)] if wanted else []
-    more += [sensitivity(campaign, wanted, placed)]
+    more += [sensitivity(campaign, wanted, placed), rarer(stand, wanted, placed)]
     if reweighted:
         more += [reweight(stand, wanted, placed, read_distributions(reweighted))]
     for part in more:

@@ -43,7 +43,7 @@ from ringsim.analysis.reweighting import (
     REWEIGHTED_STATISTICS,
     SOBOL,
 )
-from ringsim.analysis.sensitivity import refusals
+from ringsim.analysis.sensitivity import rarer_table, refusals
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import (
@@ -181,7 +181,8 @@ def sections(
     ``folder`` is the campaign's, for the commands that run samples again; unless ``full`` what
     tells it at length is left out, which takes most of the time.
     """
-    short = [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
+    changing = rarer_table(analysis)
+    short = [what_matters(analysis), *refusals(analysis), what_separates(analysis), changing]
     if "case" in analysis.dims:
         short = [case_table(analysis)]
     more = _at_length(analysis) if full else {}
@@ -241,7 +242,11 @@ def _at_length(analysis: xr.Dataset) -> dict[str, list[Table]]:
     return {
         "statistics": [statistics_table(analysis, every=True), every_statistic(analysis)],
         "errors": error_tables(analysis, every=True),
-        "matters": [*sensitivity_tables(analysis), *influence_tables(analysis)],
+        "matters": [
+            *sensitivity_tables(analysis),
+            *influence_tables(analysis),
+            rarer_table(analysis),
+        ],
     }
 
 

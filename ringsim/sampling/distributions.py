@@ -219,18 +219,19 @@ class Discrete(Distribution):
         return self
 
     @property
-    def _shares(self) -> tuple[float, ...]:
+    def shares(self) -> tuple[float, ...]:
+        """The probability of each of the values."""
         return self.probabilities or (1.0 / len(self.values),) * len(self.values)
 
     def quantile(self, probability: Array) -> Values:
         """The value whose interval of cumulative probability holds the given one."""
-        chosen = np.searchsorted(np.cumsum(self._shares)[:-1], probability, side="right")
+        chosen = np.searchsorted(np.cumsum(self.shares)[:-1], probability, side="right")
         return np.asarray(array_of(self.values)[chosen])
 
     def log_density(self, values: Values) -> Array:
         """Logarithm of the probability of each value; of words and tables also by their labels."""
         known: dict[Any, float] = {}
-        for value, share in zip(self.values, self._shares, strict=True):
+        for value, share in zip(self.values, self.shares, strict=True):
             number = type(value) in (int, float)
             known |= {label_of(value): share, str(value): share}
             known |= {float(value): share} if number else {}
@@ -242,7 +243,7 @@ class Discrete(Distribution):
 
     def levels(self, count: int) -> Array:
         """One probability for each value, whatever ``count`` is: the middle of its interval."""
-        upper = np.cumsum(self._shares)
+        upper = np.cumsum(self.shares)
         return np.asarray(0.5 * (upper + np.concatenate([[0.0], upper[:-1]])))
 
 
