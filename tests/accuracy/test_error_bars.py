@@ -220,7 +220,7 @@ def test_the_bar_of_the_asynchrony_is_that_of_all_that_came_before() -> None:
 
 def test_bars_cover_what_a_finer_run_finds() -> None:
     scene = ring(**{"solver.error_bars": True})
-    barred = run(scene).values
+    barred = run_frame(scene).values
     finer = {"solver.tolerance": 5e-6, "rods.elements": 2, "solver.error_bars": False}
     truth = run_frame(scene.with_values(finer)).values
     for name in ("deployment_time", "asynchrony_max"):

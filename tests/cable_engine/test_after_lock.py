@@ -122,7 +122,7 @@ def test_limits_that_a_run_passes_are_told_with_value_and_time() -> None:
     assert np.isfinite(limited.values["deployment_time"])
 
 
-@pytest.mark.parametrize("engine", ["frame", "full"])
+@pytest.mark.parametrize("engine", ["frame", pytest.param("full", marks=pytest.mark.slow)])
 def test_the_stress_has_a_limit_too(engine: str) -> None:
     found = uneven(
         "stop", engine, record__stress=True, limits__rod_stress=1e3, solver__end_time=0.3

@@ -84,6 +84,7 @@ def test_the_cable_ring_of_eighteen() -> None:
     compare(scene, asynchrony=0.01, tension=1e-3, stress=5e-3, lock=3e-3, base=1e-2)
 
 
+@pytest.mark.slow  # test_frame_laws.py compares rings on cables, with equal steps
 def test_a_cable_ring_of_four() -> None:
     """The same, from 150 deg on, at a coarse tolerance: the steps of both are alike, too."""
     scene = cable_ring(

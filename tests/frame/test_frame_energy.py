@@ -18,7 +18,7 @@ from ringsim.stepping.instant import Passing, lost_between
     ("name", "values", "frames", "exudyn"),
     [
         ("ring18", {"structure.sections": 6}, 1.4e-3, 1.65e-3),
-        ("truss2", {"solver.end_time": 5.0}, 4.4e-5, 6.2e-5),
+        pytest.param("truss2", {"solver.end_time": 5.0}, 4.4e-5, 6.2e-5, marks=pytest.mark.slow),
         pytest.param("ring18", {}, 2.0e-3, 1.83e-3, marks=pytest.mark.slow),
         pytest.param("truss2", {}, 6.6e-5, 5.6e-5, marks=pytest.mark.slow),
         pytest.param("ring18-cable", {}, 5.4e-5, 4.5e-5, marks=pytest.mark.slow),
