@@ -25,7 +25,8 @@ from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame
 from ringsim.variables import Outcome, Status
 
-ENGINES = [pytest.param(run_frame, id="frames"), pytest.param(run, id="exudyn")]
+FRAMES = pytest.param(run_frame, id="frames")
+ENGINES = [FRAMES, pytest.param(run, id="exudyn")]
 Engine = Callable[[Scene], Outcome]
 EA, SPAN = 100.0, 0.3
 START, STOP = 0.525, 0.732
@@ -142,7 +143,7 @@ def test_a_winch_that_answers_winds_what_its_line_says(
     assert wound[last:] == pytest.approx(wound[-1], abs=0.0)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [FRAMES, pytest.param(run, id="exudyn", marks=pytest.mark.slow)])
 def test_the_rope_of_a_ring_does_not_depend_on_the_steps(engine: Engine, steps: Steps) -> None:
     """Two motors of a ring that pull with three quarters of what stalls them; 0.03004 m at steps
     of a thirtieth.

@@ -70,15 +70,15 @@ def test_signal_after_the_last_sample_is_no_failure(copied, whole):
 
 
 def test_signal_to_one_rank_stops_all_of_them(bench, mpi):
-    start = ("campaign", bench.write(45, shared='"rods.damping" = 0.1'), "--out", "out")
-    process = bench.start(*start, ranks=3, solver="fake_solver:slow")
+    start = ("campaign", bench.write(30, shared='"rods.damping" = 0.1'), "--out", "out")
+    process = bench.start(*start, ranks=2, solver="fake_solver:slow")
     out = bench.folder / "out"
     end = time.monotonic() + 60.0
     while not finished(out):
         assert time.monotonic() < end
         assert process.poll() is None
         time.sleep(0.1)
-    (rank,) = ranks_of(bench, b"2")
+    (rank,) = ranks_of(bench, b"1")
     os.kill(rank, signal.SIGUSR1)
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
