@@ -29,7 +29,7 @@ from ringsim.simulation import simulate
 
 SETTINGS = {
     "structure.sections": 3, "structure.opening_angle": 100.0, "boom": "none",
-    "solver.end_time": 1.5, "solver.tolerance": 3e-3,
+    "solver.end_time": 1.5,
 }  # fmt: skip
 PRIORS = {
     "cables.upper.winch.winding.speed":
