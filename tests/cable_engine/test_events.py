@@ -26,7 +26,8 @@ from ringsim.simulation import run, run_frame
 from ringsim.variables import Outcome, Status
 
 FRAMES = pytest.param(run_frame, id="frames")
-ENGINES = [FRAMES, pytest.param(run, id="exudyn")]
+EXUDYN = pytest.param(run, id="exudyn", marks=pytest.mark.slow)
+"""Where test_frame_laws.py compares both with motors and feedback, and both are told the times."""
 Engine = Callable[[Scene], Outcome]
 EA, SPAN = 100.0, 0.3
 START, STOP = 0.525, 0.732
@@ -126,7 +127,7 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float]]:
 Steps = list[tuple[float, float, float]]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [FRAMES, EXUDYN])
 @pytest.mark.parametrize("line", LINES)
 def test_a_winch_that_answers_winds_what_its_line_says(
     engine: Engine, line: Line, steps: Steps
@@ -143,7 +144,7 @@ def test_a_winch_that_answers_winds_what_its_line_says(
     assert wound[last:] == pytest.approx(wound[-1], abs=0.0)
 
 
-@pytest.mark.parametrize("engine", [FRAMES, pytest.param(run, id="exudyn", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", [FRAMES, EXUDYN])
 def test_the_rope_of_a_ring_does_not_depend_on_the_steps(engine: Engine, steps: Steps) -> None:
     """Two motors of a ring that pull with three quarters of what stalls them; 0.03004 m at steps
     of a thirtieth.

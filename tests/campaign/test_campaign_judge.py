@@ -91,7 +91,12 @@ def test_campaign_merge_and_status_tell_of_the_checks(checked, finished):
 
 @pytest.mark.parametrize(
     ("most", "code"),
-    [("0.002", 0), ("5e-4", 3), ("{ deployment_time = 5e-4 }", 3), ("{ peak_tension = 5e-4 }", 0)],
+    [
+        ("0.002", 0),
+        pytest.param("5e-4", 3, marks=pytest.mark.slow),
+        ("{ deployment_time = 5e-4 }", 3),
+        pytest.param("{ peak_tension = 5e-4 }", 0, marks=pytest.mark.slow),
+    ],
 )
 def test_a_campaign_whose_engines_differ_too_much_ends_with_code_3(bench, most, code):
     written(bench, f"{CHECKED}max_difference = {most}\n")

@@ -19,7 +19,7 @@ from ringsim.core import library
 
 GCC = shutil.which("gcc")
 FLAGS = (
-    "-std=gnu11", "-O1", "-g1", "-fPIC", "-shared", "-Wno-psabi", "-fsanitize=address,undefined",
+    "-std=gnu11", "-O0", "-g1", "-fPIC", "-shared", "-Wno-psabi", "-fsanitize=address,undefined",
     "-fno-sanitize-recover=all",
 )  # fmt: skip
 START = """

@@ -48,13 +48,12 @@ def test_a_sound_run_is_left_alone(solve: Solve) -> None:
     assert float(outcome.values["energy_error"]) < ring().solver.energy_tolerance
 
 
-@ENGINES
-def test_a_run_with_absurd_steps_stops_early_with_its_cause(solve: Solve) -> None:
+def test_a_run_with_absurd_steps_stops_early_with_its_cause() -> None:
     """With its energy unwatched it goes on to the stops."""
     hard = {"loads.force": 2.0}
-    unguarded = solve(ring(**COARSE, energy_tolerance=1e6).with_values(hard))
+    unguarded = run(ring(**COARSE, energy_tolerance=1e6).with_values(hard))
     assert word_of(unguarded.cause) == "few steps"
-    outcome = solve(ring(**COARSE).with_values(hard))
+    outcome = run(ring(**COARSE).with_values(hard))
     assert outcome.status is Status.DIVERGED
     assert word_of(outcome.cause) == "energy lost"
     assert float(outcome.values["final_time"]) < float(unguarded.values["final_time"])
@@ -71,10 +70,9 @@ def test_too_coarse_steps_are_cured_by_a_new_start(solve: Solve) -> None:
     assert "start 1: time integration" in outcome.reason
 
 
-@ENGINES
-def test_constant_steps_that_newton_has_to_cut_are_too_few(solve: Solve) -> None:
+def test_constant_steps_that_newton_has_to_cut_are_too_few() -> None:
     """Six that converge until the first lock balance their energy."""
-    outcome = solve(
+    outcome = run(
         ring(step_control="constant", step=3.0, restarts=0).with_values({"loads.force": 10.0})
     )
     assert outcome.status is Status.DIVERGED
@@ -186,7 +184,7 @@ def test_an_error_of_our_own_inside_the_solver_is_not_called_a_failure_of_the_so
         integration.run()
 
 
-@pytest.mark.parametrize("step", [0.2, 0.05])
+@pytest.mark.parametrize("step", [0.2, pytest.param(0.05, marks=pytest.mark.slow)])
 def test_constant_steps_that_miss_a_ropes_swing_are_not_ok(step: float) -> None:
     """The truss is thrown within 40 ms: such steps have its largest tension wrong by 7 to 13 %."""
     short = {"solver.end_time": 1.0, "solver.step_control": "constant", "solver.restarts": 0}
