@@ -56,7 +56,6 @@ LONG = [*((case, "full") for case in QUICK), (LATE, "full")]
     ("case", "engine"),
     [
         *((case, "frame") for case in QUICK[:2]),
-        (QUICK[2] | {"solver__tolerance": 6e-4}, "full"),
         *(pytest.param(*each, marks=pytest.mark.slow) for each in LONG),
     ],
     ids=lambda case: case if isinstance(case, str) else "-".join(map(str, case.items())),
