@@ -128,7 +128,7 @@ def stowed(scene: Scene, folder: Path, **solver: float) -> tuple[xr.Dataset, Pat
     return run, folder / "stow.nc"
 
 
-@pytest.mark.parametrize("settling", [0.05, 20.0])
+@pytest.mark.parametrize("settling", [pytest.param(0.05, marks=pytest.mark.slow), 20.0])
 def test_a_ring_that_was_stowed_deploys_from_that_state(tmp_path: Path, settling: float) -> None:
     """Though it had folded and settled, and also where it would settle for far longer.
 

@@ -502,7 +502,7 @@ def test_the_course_of_the_margin_begins_where_runs_begin() -> None:
     assert np.isnan(laid[3, [0, -1]]).all()
 
 
-@pytest.mark.parametrize("kind", ["random", "one-at-a-time"])
+@pytest.mark.parametrize("kind", ["random", pytest.param("one-at-a-time", marks=pytest.mark.slow)])
 def test_stress_has_the_numbers_of_its_unit_in_all_figures(kind: str) -> None:
     campaign = made_campaign(12)
     campaign.attrs["design"] = json.dumps({"kind": kind})
