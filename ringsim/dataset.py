@@ -2,7 +2,8 @@
 
 import platform
 from datetime import UTC, datetime
-from importlib.metadata import version
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,8 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
         raise ValueError(f"variables without a definition: {', '.join(unknown)}")
     known, held = axes(scene) | outcome.coordinates, holds(scene)
     found = outcome.values | {"status": np.array(outcome.status), "cause": np.array(outcome.cause)}
-    arrays: dict[str, xr.DataArray] = {}
+    # Variables, which nothing aligns: data arrays would cost as much as a short run.
+    arrays: dict[str, xr.Variable] = {}
     for name, variable in VARIABLES.items():
         if name in found:
             arrays[name] = _array(variable, found[name])
@@ -56,7 +58,7 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
 
 
 def _add_states(
-    arrays: dict[str, xr.DataArray], coordinates: dict[str, xr.DataArray],
+    arrays: dict[str, xr.Variable], coordinates: dict[str, xr.Variable],
     outcome: Outcome, scene: Scene,
 ) -> None:  # fmt: skip
     """Add the states that a run has stored."""
@@ -69,16 +71,15 @@ def _add_states(
         "layout": layout_fingerprint(scene),
         "history": str(found["history_form"]),
     }
-    arrays["state"] = xr.DataArray(found["state"], dims="state_entry", attrs=told)
+    arrays["state"] = xr.Variable("state_entry", found["state"], told)
     for name, words in (
         ("state_form", "where the numbers of a state lie, JSON"),
         ("state_begin", "first number of a state"),
     ):
         attributes = {"long_name": words}
-        arrays[name] = xr.DataArray(found[name], dims="state_time", attrs=attributes)
+        arrays[name] = xr.Variable("state_time", found[name], attributes)
     attributes = {"long_name": "time of a stored state", "units": "s"}
-    times = xr.DataArray(found["state_time"], dims="state_time", attrs=attributes)
-    coordinates["state_time"] = times
+    coordinates["state_time"] = xr.Variable("state_time", found["state_time"], attributes)
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
@@ -97,7 +98,7 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
         )  # fmt: skip
 
 
-def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.DataArray:
+def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.Variable:
     values = np.asarray(values)
     attributes: dict[str, Any] = {"long_name": variable.long_name}
     if variable.dtype != "str":
@@ -111,7 +112,13 @@ def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.DataArray:
         )
     if variable.flags is not None:
         attributes |= flags_of(variable.flags)
-    return xr.DataArray(values, dims=variable.dims, attrs=attributes)
+    return xr.Variable(variable.dims, values, attributes)
+
+
+@cache
+def version(package: str) -> str:
+    """What is installed, which is read from a file."""
+    return metadata.version(package)
 
 
 def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:

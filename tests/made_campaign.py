@@ -79,17 +79,22 @@ def made_campaign(
             values["deployment_time"], values["lock_time"] = np.array(np.nan), lock * np.nan
         values["outcome"] = np.array(int(fate))
         bad = k in failed
-        coordinates = {"plane": np.array(PLANES), "section": np.arange(1, SECTIONS + 1),
-                       "time": TIMES, "span": spans}  # fmt: skip
         why = f"broke </script> at 4 s in sample {k}" if bad else "all V-joints have locked"
-        outcome = Outcome(
-            Status.TIMEOUT if bad else Status.OK, why, coordinates, values,
-            Cause.TIME_LIMIT if bad else Cause.NONE,
-        )  # fmt: skip
-        run = to_dataset(outcome, scene)
-        runs.append(run.assign(reason=run.attrs["reason"]))
-    found = xr.concat(runs, dim="sample", combine_attrs="override", data_vars="all")
+        end = (Status.TIMEOUT, Cause.TIME_LIMIT) if bad else (Status.OK, Cause.NONE)
+        runs.append((values, why, *end))
+    coordinates = {"plane": np.array(PLANES), "section": np.arange(1, SECTIONS + 1),
+                   "time": TIMES, "span": spans}  # fmt: skip
+    values, why, status, cause = runs[0]
+    found = to_dataset(Outcome(status, why, coordinates, values, cause), scene)
+    stacked = {name: [run[0][name] for run in runs] for name in values}
+    stacked |= {"reason": [run[1] for run in runs], "status": [int(run[2]) for run in runs],
+                "cause": [run[3] for run in runs]}  # fmt: skip
+    found = found.assign(reason=found.attrs["reason"]).expand_dims(sample=samples).copy(deep=True)
     found = found.assign_coords(sample=np.arange(samples))
+    for name, each in stacked.items():
+        array = np.array(each)
+        kept = found[name].dtype if array.dtype.kind == "i" else array.dtype
+        found[name] = found[name].dims, array.astype(kept), found[name].attrs
     found["status"] = found["status"].astype("i1")
     found["status"][list(not_run)] = -1
     found["outcome"] = found["outcome"].astype("i1")

@@ -109,7 +109,7 @@ def known(path: str, others: list[str]) -> list[Found]:
         return find(ends[0])
     # Words of meanings before words that look alike: an aperture is no temperature.  One letter is
     # in every meaning.
-    near = ends[:2] or (_told_of(plain, every)[:3] if len(plain) > 2 else [])
+    near = ends[:2] or (_told_of(plain)[:3] if len(plain) > 2 else [])
     near = near or difflib.get_close_matches(plain, [*others, *every], n=1, cutoff=0.6)
     near = near or [name for name in others if name.startswith(plain)][:3]
     hint = (
@@ -121,9 +121,15 @@ def known(path: str, others: list[str]) -> list[Found]:
     )
 
 
-def _told_of(word: str, paths_of_keys: list[str]) -> list[str]:
+def _told_of(word: str) -> list[str]:
     """Paths of the keys whose name or meaning has a word, meanings first."""
-    of = [(path, key) for path in paths_of_keys for key in (each.key for each in find(path))]
+    keys: dict[str, list[Key]] = {}
+    for root in ROOTS:
+        for model, where in places(root).items():
+            for path in where:
+                for key in keys_of(model):
+                    keys.setdefault(f"{path}.{key.name}".lstrip("."), []).append(key)
+    of = [(path, key) for path, own in keys.items() for key in own]
     whole = re.compile(rf"\b{re.escape(word)}\b", re.IGNORECASE)
     meant = [path for path, key in of if whole.search(key.meaning)]
     return list(dict.fromkeys([*meant, *(path for path, key in of if word in key.name)]))

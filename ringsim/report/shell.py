@@ -1,5 +1,6 @@
 """What all pages share: templates, figures as light as a page must be, print."""
 
+import functools
 import os
 import shutil
 import subprocess
@@ -33,21 +34,26 @@ def written(
     Those named ``beside`` are not among these, but by their names in ``beside``.  They are lines as
     long as the page stays below ``LARGEST`` with them, then pictures.
     """
+    sizes = {name: tuple(figure.get_size_inches()) for name, _, figure in drawn}
+    shape, text = _shell().get_template(template), ""
+    each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
+    for heavy in (HEAVY, HEAVY // 4, 0):
+        figures = [(name, words, one.element(heavy)) for name, words, one in each]
+        text = shape.render({**context, **_apart(figures, beside), "sizes": sizes})
+        if len(text.encode("utf-8")) <= LARGEST:
+            break
+    return text
+
+
+@functools.cache
+def _shell() -> jinja2.Environment:
+    """What templates are read by, which it compiles once."""
     shell = jinja2.Environment(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    shell.filters |= {"sentence": _sentence, "head": _head, "parted": _parted}
-    sizes = {name: tuple(figure.get_size_inches()) for name, _, figure in drawn}
-    shell.filters["sheets"] = lambda some: sheets([(sizes[one[0]], one) for one in some])
-    shape, text = shell.get_template(template), ""
-    each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
-    for heavy in (HEAVY, HEAVY // 4, 0):
-        figures = [(name, words, one.element(heavy)) for name, words, one in each]
-        text = shape.render({**context, **_apart(figures, beside)})
-        if len(text.encode("utf-8")) <= LARGEST:
-            break
-    return text
+    shell.filters |= {"sentence": _sentence, "head": _head, "parted": _parted, "sheets": _sheets}
+    return shell
 
 
 def _apart(figures: list[tuple[str, str, str]], names: Collection[str]) -> dict[str, Any]:
@@ -81,6 +87,12 @@ def sheets(figures: list[tuple[tuple[float, float], Any]]) -> list[tuple[float, 
         (next((s for s in scales if _height(own, s) <= _SHEET[1]), _LEAST), [f for _, f in own])
         for own in made
     ]
+
+
+@jinja2.pass_context
+def _sheets(context: jinja2.runtime.Context, some: list[tuple[str, str, str]]) -> list[Any]:
+    """The same for a template, which knows the sizes of its figures by their names."""
+    return sheets([(context["sizes"][one[0]], one) for one in some])
 
 
 def _height(figures: list[tuple[tuple[float, float], Any]], scale: float) -> float:

@@ -26,12 +26,13 @@ def ringsim(*words: str) -> Result:
 
 @for_each("name", builtin_scenes())
 def test_every_builtin_scene_has_its_evidence(name: str) -> None:
-    evidence = evidence_for(load_scene(name))
+    scene = load_scene(name)
+    evidence = evidence_for(scene)
     of = dict.fromkeys(("ring18-flight", "ring18-ground", "ring18-motor"), "ring18-cable")
     of["ring18-stow"] = "ring18"
     assert evidence.scene == of.get(name, name)
     for setting in evidence.settings:
-        load_scene(name).with_values(dict(setting.values))
+        scene.with_values(dict(setting.values))
 
 
 def test_settings_are_picked_and_told(tmp_path: Path) -> None:

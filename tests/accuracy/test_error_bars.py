@@ -145,7 +145,9 @@ def test_no_bars_where_the_steps_decide_what_locks() -> None:
 
 def test_bars_change_nothing_else() -> None:
     scene = ring(**SOON, **{"record.stress": True, "solver.tolerance": 1e-3})
-    plain, barred = run(scene), run(scene.with_values({"solver.error_bars": True}))
+    plain, barred = (
+        run_frame(scene.with_values({"solver.error_bars": bars})) for bars in (False, True)
+    )
     bars = {name for name in barred.values if name not in plain.values}
     assert bars == {
         "deployment_time_error", "opening_angle_error", "asynchrony_max_error",
@@ -220,7 +222,7 @@ def test_the_bar_of_the_asynchrony_is_that_of_all_that_came_before() -> None:
 
 def test_bars_cover_what_a_finer_run_finds() -> None:
     scene = ring(**{"solver.error_bars": True})
-    barred = run(scene).values
+    barred = run_frame(scene).values
     finer = {"solver.tolerance": 5e-6, "rods.elements": 2, "solver.error_bars": False}
     truth = run_frame(scene.with_values(finer)).values
     for name in ("deployment_time", "asynchrony_max"):

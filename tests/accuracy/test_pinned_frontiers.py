@@ -77,7 +77,7 @@ def test_every_setting_is_on_a_frontier(name: str, engine: str) -> None:
         )
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [pytest.param("full", marks=pytest.mark.slow), "frame"])
 @pytest.mark.parametrize(("name", "output", "accuracy"), ASKED)
 def test_a_setting_keeps_its_errors(name: str, output: str, accuracy: float, engine: str) -> None:
     scene = load_scene(name)

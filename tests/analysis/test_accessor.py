@@ -37,9 +37,14 @@ def campaign() -> xr.Dataset:
 @pytest.mark.parametrize(
     "order",
     [
-        "import ringsim, xarray; ringsim.InputError", "import xarray, ringsim",
-        "import ringsim.accessor, xarray, ringsim",
-        "import ringsim; ringsim.simulate; import xarray",
+        "import ringsim, xarray; ringsim.InputError",
+        *(
+            pytest.param(order, marks=pytest.mark.slow)
+            for order in (
+                "import xarray, ringsim", "import ringsim.accessor, xarray, ringsim",
+                "import ringsim; ringsim.simulate; import xarray",
+            )
+        ),
         "import xarray; xarray.open_dataset(FILE); import ringsim",
         "import ringsim, xarray; xarray.open_dataset(FILE, engine='ringsim')",
     ],

@@ -53,7 +53,8 @@ def test_the_largest_rank_correlation_by_chance(measure, samples):
 
 
 @pytest.mark.parametrize("design", [pytest.param(RandomDesign(samples=100), marks=pytest.mark.slow),
-                                    Sobol(samples=128, replicates=8),
+                                    pytest.param(Sobol(samples=128, replicates=8),
+                                                 marks=pytest.mark.slow),
                                     RandomDesign(samples=30)])  # fmt: skip
 def test_of_noise_by_many_inputs_nothing_is_told_and_what_matters_still_is(design):
     random, told = np.random.default_rng(8), 0

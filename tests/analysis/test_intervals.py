@@ -57,7 +57,7 @@ DRAWN = {
 """Draws, their standard deviation, and what an interval of 95 % of it must hold at least."""
 
 
-@pytest.mark.parametrize("samples", [20, 50, 200])
+@pytest.mark.parametrize("samples", [20, pytest.param(50, marks=pytest.mark.slow), 200])
 @pytest.mark.parametrize("name", DRAWN)
 def test_standard_deviations_with_long_tails_are_held_as_told(name, samples):
     """BCa: 0.82 of the exponential with 20 samples, 0.59, 0.71, 0.81 of the last."""

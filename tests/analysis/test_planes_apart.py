@@ -64,6 +64,7 @@ def test_each_speed_alone_does_not_show_it() -> None:
     assert found.sel(input=APART) == pytest.approx(1.0)
 
 
+@pytest.mark.slow  # of inputs as such test_chance.py says it
 def test_without_any_dependence_chance_names_inputs_as_seldom_as_it_is_told() -> None:
     """One output in 10 at most, by its index or its rank correlation; 100 campaigns have a standard
     error of 3 %.

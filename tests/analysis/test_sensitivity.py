@@ -51,9 +51,16 @@ class _Plain:
     each_section = False
 
 
-@pytest.mark.parametrize("lost", [0.0, 0.05])
+@pytest.mark.parametrize(
+    ("name", "lost"),
+    [
+        ("ishigami", 0.0),
+        ("grouped", 0.05),
+        pytest.param("ishigami", 0.05, marks=pytest.mark.slow),
+        pytest.param("grouped", 0.0, marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize("case", SOME)
-@pytest.mark.parametrize("name", ["ishigami", "grouped"])
 def test_intervals_of_sobol_indices_cover(name, case, lost):
     """Also with 5 % of the rows lost at random, and with them a quarter of the blocks."""
     campaigns, least, most = case

@@ -13,7 +13,7 @@ from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import run, run_frame
+from ringsim.simulation import FIDELITIES, run_frame
 from ringsim.variables import Fate, Outcome, Status
 
 
@@ -66,7 +66,10 @@ def test_winches_do_after_the_lock_what_they_are_told(after_lock: str, engine: s
     assert found.values["energy_error"] < 1e-3
 
 
-def test_a_winch_that_holds_follows_the_line_of_its_motor(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("engine", ["frame", pytest.param("full", marks=pytest.mark.slow)])
+def test_a_winch_that_holds_follows_the_line_of_its_motor(
+    engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """T = T0 (1 - b v / v0) at the end of every step, T0 being the tension at the lock, v the speed
     of the drum, v0 the usual one and b the band of a stall motor.
 
@@ -84,7 +87,8 @@ def test_a_winch_that_holds_follows_the_line_of_its_motor(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(Recorder, "note", watched)
     slippery = {f"cables.{plane}.friction": {"kind": "none"} for plane in ("upper", "lower")}
-    found = run(uneven_scene("hold", solver__tolerance=1e-3).with_values(slippery))
+    scene = uneven_scene("hold", solver__tolerance=1e-3).with_values(slippery)
+    found = FIDELITIES[engine](scene)
     assert found.fate is Fate.DEPLOYED
     times, angles, wound, turning, tension = np.array(seen).T
     lock = int(np.argmax(angles >= np.pi))
@@ -122,7 +126,7 @@ def test_limits_that_a_run_passes_are_told_with_value_and_time() -> None:
     assert np.isfinite(limited.values["deployment_time"])
 
 
-@pytest.mark.parametrize("engine", ["frame", "full"])
+@pytest.mark.parametrize("engine", ["frame", pytest.param("full", marks=pytest.mark.slow)])
 def test_the_stress_has_a_limit_too(engine: str) -> None:
     found = uneven(
         "stop", engine, record__stress=True, limits__rod_stress=1e3, solver__end_time=0.3

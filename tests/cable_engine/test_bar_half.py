@@ -49,7 +49,8 @@ def test_points_of_the_model_are_those_of_the_bracket(half: str, end: str, openi
 @pytest.mark.parametrize(
     ("half", "engine"),
     [
-        ("first", "full"),
+        # test_points_of_the_model above is of exudyn's model, in any case.
+        pytest.param("first", "full", marks=pytest.mark.slow),
         ("first", "frame"),
         ("second", "frame"),
         pytest.param("second", "full", marks=pytest.mark.slow),

@@ -25,7 +25,9 @@ from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame
 from ringsim.variables import Outcome, Status
 
-ENGINES = [pytest.param(run_frame, id="frames"), pytest.param(run, id="exudyn")]
+FRAMES = pytest.param(run_frame, id="frames")
+EXUDYN = pytest.param(run, id="exudyn", marks=pytest.mark.slow)
+"""Where test_frame_laws.py compares both with motors and feedback, and both are told the times."""
 Engine = Callable[[Scene], Outcome]
 EA, SPAN = 100.0, 0.3
 START, STOP = 0.525, 0.732
@@ -125,7 +127,7 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float]]:
 Steps = list[tuple[float, float, float]]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [FRAMES, EXUDYN])
 @pytest.mark.parametrize("line", LINES)
 def test_a_winch_that_answers_winds_what_its_line_says(
     engine: Engine, line: Line, steps: Steps
@@ -142,7 +144,7 @@ def test_a_winch_that_answers_winds_what_its_line_says(
     assert wound[last:] == pytest.approx(wound[-1], abs=0.0)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [FRAMES, EXUDYN])
 def test_the_rope_of_a_ring_does_not_depend_on_the_steps(engine: Engine, steps: Steps) -> None:
     """Two motors of a ring that pull with three quarters of what stalls them; 0.03004 m at steps
     of a thirtieth.

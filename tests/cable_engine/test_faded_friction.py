@@ -27,7 +27,10 @@ def slowly(**values: Any) -> Scene:
     return truss(**(fields | values))
 
 
-@pytest.mark.parametrize("fidelity", [outcome, run_frame], ids=["full", "frame"])
+@pytest.mark.parametrize(
+    "fidelity",
+    [pytest.param(outcome, id="full", marks=pytest.mark.slow), pytest.param(run_frame, id="frame")],
+)
 def test_too_fast_a_slip_speed_is_named_with_its_cure(fidelity: Any) -> None:
     found = fidelity(slowly(cables__upper__slip_speed=2e-4))
     assert found.fate is Fate.CUT_OFF
@@ -79,5 +82,5 @@ def test_silence_where_friction_acts_or_where_there_is_none() -> None:
 
 
 def test_a_motor_that_stalls_into_a_crawl_is_judged_by_what_it_wound() -> None:
-    found = outcome(slowly(both__winch__winding=STALLED, joints__vjoint__viscous=0.5))
+    found = run_frame(slowly(both__winch__winding=STALLED, joints__vjoint__viscous=0.5))
     assert "; pulley friction is smoothed" in found.reason

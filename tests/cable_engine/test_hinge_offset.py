@@ -10,7 +10,7 @@ from ringsim.scene import load_scene
 from ringsim.variables import Fate, Outcome
 
 
-def opened(offset: float, sections: int = 2, end: float = 1.0) -> Outcome:
+def opened(offset: float, sections: int = 2, end: float = 1.0, engine: str = "full") -> Outcome:
     return outcome(
         truss(
             sections,
@@ -18,7 +18,8 @@ def opened(offset: float, sections: int = 2, end: float = 1.0) -> Outcome:
             structure__opening_angle=90.0,
             both__winch__winding={"kind": "ramp", "speed": 0.05, "duration": 0.5},
             solver__end_time=end,
-        )
+        ),
+        engine,
     )
 
 
@@ -36,9 +37,10 @@ def test_a_single_section_has_no_span_between_hinges() -> None:
     assert opened(0.0, sections=1, end=0.2).fate is Fate.CUT_OFF
 
 
-def test_the_least_offset_that_is_allowed_is_the_limit() -> None:
+@pytest.mark.parametrize("engine", ["frame", pytest.param("full", marks=pytest.mark.slow)])
+def test_the_least_offset_that_is_allowed_is_the_limit(engine: str) -> None:
     """Results at 1e-6 and 1e-4 m differ by what the offset changes: a 1e-4 of lengths of 1 m."""
-    small, larger = opened(1e-6), opened(1e-4)
+    small, larger = (opened(offset, engine=engine) for offset in (1e-6, 1e-4))
     for name, near in (("opening_angle", 1e-3), ("cable_tension", 1e-3)):
         one, other = small.values[name][..., -1], larger.values[name][..., -1]
         assert one == pytest.approx(other, rel=near)

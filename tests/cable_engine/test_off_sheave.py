@@ -16,7 +16,9 @@ from ringsim.variables import Fate
 
 TRUSS = ringsim.load_scene("truss2")
 SHORT: dict[str, Any] = {"solver.end_time": 0.6, "record.interval": 0.001}
-ENGINES = pytest.mark.parametrize("fidelity", ["frame", "full"])
+ENGINES = pytest.mark.parametrize(
+    "fidelity", ["frame", pytest.param("full", marks=pytest.mark.slow)]
+)
 
 
 def run(fidelity: str, **values: Any) -> xr.Dataset:
@@ -104,7 +106,7 @@ FREE = ("free", {"kind": "cut-cable", "span": "section 1 V to second hinge"})
         ("frame", *WEDGED),
         ("frame", *FREE),
         pytest.param("full", *WEDGED, marks=pytest.mark.slow),
-        ("full", *FREE),
+        pytest.param("full", *FREE, marks=pytest.mark.slow),
     ],
 )
 def test_off_its_sheave_a_rope_is_held_or_carries_nothing(

@@ -24,7 +24,7 @@ sys.path.insert(0, folder)
 for law in ("sheave_efficiency", "pulsating"):
     importlib.import_module(law)
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import run
+from ringsim.simulation import run_frame as run
 scene = load_scene("truss2").with_values(values)
 assert Scene.model_validate(scene.model_dump(mode="json")) == scene
 found = run(scene)

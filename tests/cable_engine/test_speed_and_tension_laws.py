@@ -62,7 +62,14 @@ def ran(name: str, *engines: str) -> dict[str, Any]:
     return answer
 
 
-@pytest.mark.parametrize("name", ["stribeck", pytest.param("seal", marks=pytest.mark.slow)])
+def test_a_run_with_a_law_of_speed_balances_its_energy() -> None:
+    found = ran("stribeck", "frame")["frame"]
+    assert np.array(found["angle"])[..., -1].min() > 61.0
+    assert found["energy_error"] < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["stribeck", "seal"])
 def test_both_engines_agree_and_balance_their_energy(name: str) -> None:
     found = ran(name, "frame", "full")
     frame, full = found["frame"], found["full"]
@@ -77,7 +84,7 @@ def test_friction_that_falls_with_speed_leaves_more_tension() -> None:
     """The rope runs at several times ``speed``: what is left is ``kinetic``, 0.4 of the bearing."""
     bearing, falling = (
         np.array(ran(name, *engines)["frame"]["tension"])
-        for name, engines in (("bearing", ["frame"]), ("stribeck", ["frame", "full"]))
+        for name, engines in (("bearing", ["frame"]), ("stribeck", ["frame"]))
     )
     lost = [-np.log(each[:, 1, 10] / each[:, 0, 10]) for each in (bearing, falling)]
     assert lost[1] == pytest.approx(0.4 * lost[0], rel=0.02)

@@ -42,7 +42,8 @@ def last_of(found: Outcome, name: str) -> np.ndarray:
     [
         pytest.param(CONSTANT, "frame", id="constant-frame"),
         pytest.param(CONSTANT, "full", id="constant-full", marks=pytest.mark.slow),
-        pytest.param(RAMP, "full", id="ramp-full"),
+        pytest.param(RAMP, "frame", id="ramp-frame"),
+        pytest.param(RAMP, "full", id="ramp-full", marks=pytest.mark.slow),
     ],
 )
 def test_a_prescribed_law_winds_what_it_says(winding: dict[str, Any], engine: str) -> None:

@@ -17,7 +17,7 @@ def reference(tmp_path_factory):
     return bench.result("out")
 
 
-@pytest.mark.parametrize("workers", [1, 4])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 4])
 def test_local_workers_give_the_serial_file(workers, bench, reference):
     bench.run("campaign", bench.write(), "--workers", workers, "--out", "out")
     xr.testing.assert_identical(comparable(bench.result("out")), comparable(reference))

@@ -91,7 +91,12 @@ def test_campaign_merge_and_status_tell_of_the_checks(checked, finished):
 
 @pytest.mark.parametrize(
     ("most", "code"),
-    [("0.002", 0), ("5e-4", 3), ("{ deployment_time = 5e-4 }", 3), ("{ peak_tension = 5e-4 }", 0)],
+    [
+        ("0.002", 0),
+        pytest.param("5e-4", 3, marks=pytest.mark.slow),
+        ("{ deployment_time = 5e-4 }", 3),
+        pytest.param("{ peak_tension = 5e-4 }", 0, marks=pytest.mark.slow),
+    ],
 )
 def test_a_campaign_whose_engines_differ_too_much_ends_with_code_3(bench, most, code):
     written(bench, f"{CHECKED}max_difference = {most}\n")
@@ -152,12 +157,12 @@ def test_a_finished_campaign_may_be_checked_later(bench):
     assert bench.result("out").status_checked.values.tolist() == [0, -1, 0, -1, 0]
 
 
-def test_every_way_to_run_gives_the_same(checked, mpi):
+@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.slow)])
+def test_every_way_to_run_gives_the_same(ranks, checked, mpi):
     before = comparable(checked.result("out"))
-    for name, options, ranks in (("serial", ("--workers", 0), 0), ("ranks", (), 2)):
-        start = (*CALL[:2], "--out", name, *CALL[4:])
-        checked.run(*start, *options, ranks=ranks)
-        xr.testing.assert_identical(comparable(checked.result(name)), before)
+    start = (*CALL[:2], "--out", f"by{ranks}", *CALL[4:])
+    checked.run(*start, *(() if ranks else ("--workers", 0)), ranks=ranks)
+    xr.testing.assert_identical(comparable(checked.result(f"by{ranks}")), before)
 
 
 def test_parts_check_their_own_samples(bench):

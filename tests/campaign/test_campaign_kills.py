@@ -170,10 +170,9 @@ def test_four_kills_cost_a_local_campaign_nothing(bench, undisturbed):
     assert drill(LOCAL, ranks=0, seed=7, bench=bench, undisturbed=undisturbed) == 4
 
 
-def test_three_kills_cost_an_mpi_campaign_nothing(bench, undisturbed, mpi):
-    """The last one leaves the ranks alive, which finish.  All at once die above, and below."""
-    kinds = ["launcher", "rank", "solver"]
-    assert drill(kinds, ranks=2, seed=5, bench=bench, undisturbed=undisturbed) == 3
+def test_a_rank_that_is_killed_costs_an_mpi_campaign_nothing(bench, undisturbed, mpi):
+    """Solver processes die above, and all of it below."""
+    assert drill(["rank"], ranks=2, seed=5, bench=bench, undisturbed=undisturbed) == 1
 
 
 def shuffled(kinds, seed):

@@ -41,8 +41,18 @@ def test_what_is_deleted_is_made_again(delete, copied, whole):
     assert_same(copied, whole)
 
 
-@pytest.mark.parametrize("writer", ["all-rank0", "part1of2-rank1", "part3of9-rank0"])
-@pytest.mark.parametrize("again", [("--workers", 2), ("--part", "1/1"), ("--part", "1/2")])
+WRITERS = ("all-rank0", "part1of2-rank1", "part3of9-rank0")
+AGAIN = (("--workers", 2), ("--part", "1/1"), ("--part", "1/2"))
+
+
+@pytest.mark.parametrize(
+    ("writer", "again"),
+    [
+        pytest.param(writer, again, marks=() if k == n else pytest.mark.slow)
+        for k, writer in enumerate(WRITERS)
+        for n, again in enumerate(AGAIN)
+    ],
+)
 def test_journal_of_any_dead_writer_counts(writer, again, copied, whole):
     """Also for a run that divides the samples in another way."""
     lose(copied, range(3, 7))

@@ -60,6 +60,7 @@ def test_samples_that_have_not_run_are_left_to_the_plain_command(bench):
     assert bench.result("out").overrides.values.tolist() == ["", WORDS, ""]
 
 
+@pytest.mark.slow  # workers do above
 def test_all_ranks_run_with_the_other_settings(bench, mpi):
     bench.write_listed([12, 12, 12, 12, 30, 12])
     poisoned(bench)

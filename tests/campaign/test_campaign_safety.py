@@ -238,7 +238,7 @@ def test_status_names_all_samples_that_run(bench):
             told = bench.run("status", "out")
 
 
-@pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_solver_process_that_cannot_start_is_told_and_nobody_waits(ranks, bench, request):
     if ranks:
         request.getfixturevalue("mpi")
@@ -262,7 +262,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
-@pytest.mark.parametrize("ranks", [pytest.param(0, marks=pytest.mark.slow), 2])
+@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_full_disk_stops_the_campaign_and_loses_no_finished_sample(
     ranks, small_disk, bench, request
 ):
@@ -309,8 +309,9 @@ def test_workers_under_mpi_are_refused(bench, mpi):
     assert printed.count("leave out --workers") == 1
 
 
-def test_solver_process_knows_neither_mpi_nor_xarray_nor_matplotlib(bench, mpi):
-    for ranks in (0, 2):
-        start = ("campaign", bench.write(2), "--out", f"out{ranks}")
-        bench.run(*start, ranks=ranks, solver="fake_solver:spy", fresh=True)
-        assert set(bench.result(start[-1]).reason.values) == {"clean"}
+@pytest.mark.parametrize("ranks", [pytest.param(0, marks=pytest.mark.slow), 2])
+def test_solver_process_knows_neither_mpi_nor_xarray_nor_matplotlib(ranks, bench, mpi):
+    """Least of all below ranks, which know all three."""
+    bench.run("campaign", bench.write(2), "--out", "out", ranks=ranks, solver="fake_solver:spy",
+              fresh=True)  # fmt: skip
+    assert set(bench.result("out").reason.values) == {"clean"}

@@ -114,6 +114,7 @@ def test_nor_on_mpi(tail, bench, mpi):
     assert_same(bench, tail)
 
 
+@pytest.mark.slow  # test_stop_when.py and test_campaign_kills.py kill what decides as it runs
 def test_nor_on_a_kill(tail, bench):
     write(bench)
     process = bench.start(*START, "--workers", 0)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from preloaded import ringsim
 
 from campaign_bench import MPIEXEC, PYTHON
 from ringsim import Campaign, InputError, extensions, load_scene
@@ -97,13 +98,18 @@ class Again(Output):
 """
 
 
-def call(*words: str, code: int = EXIT_DONE, ranks: int = 0, cwd: Path | None = None) -> str:
-    """What a command prints, in a process of its own."""
-    launcher = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
-    done = subprocess.run(
-        [*launcher, *PYTHON, *words], capture_output=True, text=True, timeout=300, check=False,
-        cwd=cwd,
-    )  # fmt: skip
+def call(
+    *words: str, code: int = EXIT_DONE, ranks: int = 0, cwd: Path | None = None, fresh: bool = False
+) -> str:
+    """What a command prints; MPI, and ``fresh`` workers, start processes that know nothing."""
+    if ranks or fresh:
+        launcher = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
+        done = subprocess.run(
+            [*launcher, *PYTHON, *words], capture_output=True, text=True, timeout=300, check=False,
+            cwd=cwd,
+        )  # fmt: skip
+    else:
+        done = ringsim(*words, folder=cwd)
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout + done.stderr
 
@@ -123,7 +129,7 @@ def test_own_kinds_run_everywhere(study: Path, tmp_path: Path) -> None:
     """Ranks, workers, replays from another folder, the folder moved; the law is that of a bearing
     here, and so are the numbers.
     """
-    call("campaign", "own.toml", "--out=done", "--workers=2", cwd=study)
+    call("campaign", "own.toml", "--out=done", "--workers=2", cwd=study, fresh=True)
     assert "4 of 4" in call("status", str(study / "done"), cwd=tmp_path)
     found = xr.load_dataset(study / "done/campaign.nc")
     assert found["status"].values.tolist() == [0] * 4

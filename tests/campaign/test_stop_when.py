@@ -68,6 +68,7 @@ def test_it_ends_there_for_any_number_of_workers(workers, ended, bench):
     assert_same(bench, ended)
 
 
+@pytest.mark.slow  # for workers, in parts and after a kill it does by default
 def test_it_ends_there_under_mpi(ended, bench, mpi):
     write(bench)
     bench.run("campaign", "small.toml", "--out", "out", ranks=2)

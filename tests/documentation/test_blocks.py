@@ -83,7 +83,11 @@ def test_python_of_a_page_runs(page: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "page",
-    [ROOT / "README.md", ROOT / "docs" / "guide" / "commands.md", ROOT / "docs/howto/go_on.md"],
+    [
+        ROOT / "README.md",
+        pytest.param(ROOT / "docs" / "guide" / "commands.md", marks=pytest.mark.slow),
+        ROOT / "docs" / "howto" / "go_on.md",
+    ],
     ids=lambda path: path.stem,
 )
 def test_python_of_a_page_runs_in_the_full_model(page: Path, tmp_path: Path) -> None:
@@ -102,6 +106,7 @@ def test_python_of_a_page_runs_in_the_full_model(page: Path, tmp_path: Path) -> 
         script(page, tmp_path, full + "\nassert dataset.status.item() == 0, dataset.reason")
 
 
+@pytest.mark.slow  # in frames all of that page runs above
 def test_the_laws_of_ones_own_run_in_both_engines(tmp_path: Path) -> None:
     """Each listing of that page with a run: same angles at the end, and what the law changes."""
     friction, stribeck, fault = blocks(ROOT / "docs" / "howto" / "own_structure.md", "python")

@@ -31,7 +31,7 @@ def load_case(campaign: str, force: float) -> xr.Dataset:
     [
         ("paper_002", (0, 2), 0.015),
         pytest.param("paper_002", (0, 2), 0.020, marks=pytest.mark.slow),
-        ("paper_002", (0, 2), 0.030),
+        pytest.param("paper_002", (0, 2), 0.030, marks=pytest.mark.slow),
         *(
             pytest.param("paper_002_ancf", (1, 3), force, marks=pytest.mark.slow)
             for force in (0.015, 0.020, 0.030)

@@ -90,7 +90,7 @@ def test_error_bars_cover_the_difference_of_the_engines() -> None:
 
 def test_who_names_no_engine_gets_frames_where_they_represent_the_scene(tmp_path: Path) -> None:
     """And the full model elsewhere, which the first line says, and why."""
-    short = "--set", "solver.end_time=0.3", "--out", str(tmp_path / "run.nc")
+    short = "--set", "solver.end_time=0.1", "--out", str(tmp_path / "run.nc")
     assert "truss2: ok" in called("run", "truss2", *short).splitlines()[0]
     with xr.open_dataset(tmp_path / "run.nc") as found:
         assert found["fidelity"].item() == Fidelity.FRAME
@@ -100,7 +100,7 @@ def test_who_names_no_engine_gets_frames_where_they_represent_the_scene(tmp_path
     with xr.open_dataset(tmp_path / "run.nc") as found:
         assert found["fidelity"].item() == Fidelity.FULL
     for name, wanted in (("truss2", Fidelity.FRAME), ("planar-truss", Fidelity.FULL)):
-        scene = load_scene(name).with_values({"solver.end_time": 0.3})
+        scene = load_scene(name).with_values({"solver.end_time": 0.1})
         assert simulate(scene)["fidelity"].item() == wanted
     # What frames alone know is refused by the full model, with its own words.
     called("run", "planar-truss", "--set", "record.state_interval=0.01", *short, code=2)

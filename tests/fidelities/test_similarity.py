@@ -15,6 +15,7 @@ from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run_frame
 
 SLIP = {f"cables.{plane}.slip_speed": 2e-4 for plane in ("upper", "lower")}
+NAMES = ("ring18", "ring18-cable", "ring18-motor")
 COMPARED = ("deployment_time", "lock_time", "asynchrony_max", "peak_tension", "peak_rod_stress")
 
 
@@ -24,9 +25,16 @@ def ring(name: str) -> Scene:
     return scene if scene.cables is None else scene.with_values(SLIP)
 
 
-@pytest.mark.parametrize("name", ["ring18", "ring18-cable", "ring18-motor"])
+LONGER, ALL = Scale(length=4.0), Scale(length=2.0, time=4.0, mass=16.0)
+
+
 @pytest.mark.parametrize(
-    "scale", [Scale(length=4.0), Scale(length=2.0, time=4.0, mass=16.0)], ids=["longer", "all"]
+    ("scale", "name"),
+    [
+        *(pytest.param(ALL, name, id=f"all-{name}") for name in NAMES),
+        *(pytest.param(LONGER, name, id=f"longer-{name}") for name in NAMES[:2]),
+        pytest.param(LONGER, NAMES[2], id=f"longer-{NAMES[2]}", marks=pytest.mark.slow),
+    ],
 )
 def test_a_similar_ring_has_similar_results(name: str, scale: Scale) -> None:
     """To what Newton leaves: a norm of newtons and newton metres moved the peaks by 1e-3 to 0.1."""

@@ -32,9 +32,10 @@ def six(step: float, end: float) -> Scene:
     )
 
 
+@pytest.mark.slow  # test_frame_laws.py compares the angles of such a ring
 @pytest.mark.parametrize(
     ("step", "end"),
-    [pytest.param(0.01, 2.0), pytest.param(1e-3, 3.25, marks=pytest.mark.slow)],
+    [(0.01, 2.0), (1e-3, 3.25)],
 )
 def test_joints_of_a_ring_of_six_deviate_alike(step: float, end: float) -> None:
     """To 1e-3 of the largest deviation at every time: with the same steps, and the same rods, only
@@ -84,6 +85,7 @@ def test_the_cable_ring_of_eighteen() -> None:
     compare(scene, asynchrony=0.01, tension=1e-3, stress=5e-3, lock=3e-3, base=1e-2)
 
 
+@pytest.mark.slow  # test_frame_laws.py compares rings on cables, with equal steps
 def test_a_cable_ring_of_four() -> None:
     """The same, from 150 deg on, at a coarse tolerance: the steps of both are alike, too."""
     scene = cable_ring(

@@ -49,7 +49,7 @@ def test_rings_on_cables(values: dict[str, object]) -> None:
     check(of_cables(values))
 
 
-@pytest.mark.parametrize("fidelity", ["full", "frame"])
+@pytest.mark.parametrize("fidelity", [pytest.param("full", marks=pytest.mark.slow), "frame"])
 def test_faults_closer_than_any_step(fidelity: str) -> None:
     """A cable is cut twice, 1e-10 s apart, which is as if it were cut so at once."""
     first = {"kind": "cut-cable", "cable": 1, "span": 2, "time": 0.2}

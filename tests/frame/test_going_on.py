@@ -124,7 +124,13 @@ def test_a_winch_that_is_switched_on_again_goes_on_with_the_rope_on_its_drum(
 
 @pytest.mark.parametrize(
     "change",
-    [{"winding.gear_ratio": 50.0}, {"winding.stall_torque": 2e-5}, {"start_time": 0.02}],
+    [
+        {"winding.gear_ratio": 50.0},
+        *(
+            pytest.param(change, marks=pytest.mark.slow)
+            for change in ({"winding.stall_torque": 2e-5}, {"start_time": 0.02})
+        ),
+    ],
     ids=str,
 )
 def test_what_a_motor_gave_before_a_change_stays(change: dict[str, float], tmp_path: Path) -> None:

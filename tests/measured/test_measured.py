@@ -371,7 +371,8 @@ def test_page_of_a_campaign_shows_the_test_beside_its_samples(
     monkeypatch.setattr(figures, "PICTURES", few)
     folder = tmp_path / "six"
     campaign = Campaign(
-        OPENING, {"cables.upper.winch.winding.speed": Uniform(low=0.08, high=0.12)},
+        OPENING.with_values({"solver.tolerance": 3e-3, "solver.settling_time": 0.0}),
+        {"cables.upper.winch.winding.speed": Uniform(low=0.08, high=0.12)},
         {"kind": "random", "samples": 6}, 1, fidelity="frame",
     ).run(workers=0, out=folder)  # fmt: skip
     at = np.array([0.3, 0.6, 0.9])

@@ -89,7 +89,7 @@ def test_cables_of_every_section_and_of_one_plane() -> None:
     assert int(run.peak_net_tension_section) == 1
 
 
-@pytest.mark.parametrize("fidelity", ["frame", "full"])
+@pytest.mark.parametrize("fidelity", ["frame", pytest.param("full", marks=pytest.mark.slow)])
 def test_the_ring_opens_in_the_time_of_the_quadrature(fidelity: str) -> None:
     """Springs give their energy, cables take theirs: T = integral of sqrt(I / (2 W)) dphi."""
     scene = sprung()

@@ -75,7 +75,7 @@ def test_virtual_work() -> None:
         assert now.margin == pytest.approx(0.8 * torque / (2.0 * 3.0 * 0.001) - 1.0, rel=1e-9)
 
 
-@pytest.mark.parametrize("fidelity", ["frame", "full"])
+@pytest.mark.parametrize("fidelity", ["frame", pytest.param("full", marks=pytest.mark.slow)])
 def test_a_ring_goes_on_without_a_spring_that_fails(fidelity: str) -> None:
     """One of each section, the middle one of which gives no torque from 0.2 s on."""
     fault = {"kind": "failed-spring", "plane": "lower", "section": 2, "time": 0.2}

@@ -60,7 +60,7 @@ def test_at_every_output_time_it_is_the_static_margin_of_that_angle() -> None:
     assert np.isnan(found.values["drive_margin"][11:]).all()
 
 
-@pytest.mark.parametrize("interval", [0.01, 0.1, 0.26])
+@pytest.mark.parametrize("interval", [pytest.param(0.01, marks=pytest.mark.slow), 0.1, 0.26])
 def test_the_least_is_that_of_check_at_any_output_interval(interval: float) -> None:
     scene = netted()
     truth = DriveMargin(scene, EcssMechanisms()).least()
@@ -148,7 +148,7 @@ def test_the_margin_ends_where_nobody_drives_on_purpose(
     assert (words in run.reason) == both
 
 
-@pytest.mark.parametrize("interval", [0.02, 0.13])
+@pytest.mark.parametrize("interval", [pytest.param(0.02, marks=pytest.mark.slow), 0.13])
 def test_the_least_between_output_times_knows_what_is_broken(interval: float) -> None:
     scene = netted(
         faults=[CUT | {"time": 0.5}, {"kind": "stuck-vjoint", "section": 1, "time": 2.0}]

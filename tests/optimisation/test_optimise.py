@@ -43,6 +43,7 @@ verdict = 24
 "structure.opening_angle" = 150.0
 boom = "none"
 "solver.end_time" = 3.0
+"solver.settling_time" = 0.0
 "record.interval" = 0.1
 "cables.upper.winch.winding.speed" = 0.16
 "cables.lower.winch.winding.speed" = 0.16

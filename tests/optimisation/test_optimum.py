@@ -257,6 +257,7 @@ def ring_of_four():
     return [scipy.interpolate.RectBivariateSpline(*grid, known[..., k], s=0) for k in (0, 1)]
 
 
+@pytest.mark.slow  # test_optimise.py finds a best speed, and bisection the same
 def test_fastest_ring_that_keeps_to_a_tension_is_that_of_brute_force():
     """Friction is lognormal; all speeds with 20,000 antennas each tell the fastest one of which
     90 % keep to 9 N."""

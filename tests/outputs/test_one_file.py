@@ -47,7 +47,7 @@ def opening_rate(monkeypatch):
     del sys.modules["opening_rate"]
 
 
-@pytest.mark.parametrize(("fidelity", "end", "gained"), [("frame", 2.0, 5.0), ("full", 0.5, 1.0)])
+@pytest.mark.parametrize(("fidelity", "end", "gained"), [("frame", 2.0, 5.0), ("full", 0.3, 0.3)])
 def test_a_run_has_it(opening_rate, fidelity, end, gained) -> None:
     short = {"record.interval": 0.01, "solver.end_time": end, "solver.tolerance": 1e-3}
     found = simulate(SCENE.with_values(short), fidelity)

@@ -8,11 +8,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from ringsim.exudyn.build import build
 from ringsim.exudyn.integrate import Integration
+from ringsim.frame.integrate import Integration as Frames
+from ringsim.frame.model import FrameModel
 from ringsim.outputs.recorder import Recorder
 from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene, load_scene
@@ -88,7 +91,13 @@ class Run:
         return np.asarray(self.times < np.nanmin(self.locks))
 
 
-def run(scene: Scene) -> Run:
+ENGINES = pytest.mark.parametrize("engine", ["frame", pytest.param("full", marks=pytest.mark.slow)])
+"""Frames take a fifth of exudyn's time, and tests/frame/test_frame_laws.py holds both together."""
+
+
+def run(scene: Scene, engine: str = "full") -> Run:
+    if engine == "frame":
+        return Run(scene, Frames(FrameModel(scene)).run())
     return Run(scene, Integration(build(scene)).run())
 
 

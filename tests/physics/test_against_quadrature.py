@@ -7,9 +7,6 @@ from ring_runs import UNTIL_LOCKED, Run, ideal_time, ring, run
 AGREEMENT = 2e-4
 """Error of the steps at the default tolerance of 3e-4, and elasticity of the rods."""
 
-QUICK = {(6, "free", "net")}
-"""A ring with a fixed base runs below, with soft rods and with stiff ones."""
-
 
 def case(sections: int, base: str, net: str) -> Run:
     """A ring that opens; the net's neutral length grows with the ring.
@@ -33,15 +30,10 @@ def case(sections: int, base: str, net: str) -> Run:
     return run(scene)
 
 
-@pytest.mark.parametrize(
-    ("sections", "base", "net"),
-    [
-        pytest.param(n, base, net, marks=() if (n, base, net) in QUICK else pytest.mark.slow)
-        for n in (6, 12, 18, 30)
-        for base in ("free", "fixed")
-        for net in ("none", "net")
-    ],
-)
+@pytest.mark.slow  # tests/frame/test_frame_quadrature.py has rings of six, an arc is below
+@pytest.mark.parametrize("net", ["none", "net"])
+@pytest.mark.parametrize("base", ["free", "fixed"])
+@pytest.mark.parametrize("sections", [6, 12, 18, 30])
 def test_mean_angle_comes_to_175_deg_on_time(sections: int, base: str, net: str) -> None:
     found = case(sections, base, net)
     expected = ideal_time(found.scene, 175.0)

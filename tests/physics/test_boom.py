@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ring_runs import UNTIL_LOCKED, Array, ring, run
+from ring_runs import ENGINES, UNTIL_LOCKED, Array, ring, run
 from ringsim.exudyn.assembly import axes_of, turn_rates
 from ringsim.exudyn.build import Built, build
 from ringsim.exudyn.integrate import Integration
@@ -29,13 +29,15 @@ from ringsim.scene import Scene, load_scene
         pytest.param("free", 47.578, marks=pytest.mark.slow),
     ],
 )
-def test_a_flexible_boom_hardly_bends(base: str, start: float) -> None:
+@ENGINES
+def test_a_flexible_boom_hardly_bends(base: str, start: float, engine: str) -> None:
     """A tube of 60 mm against rods of 10 mm: its bending is a hundredth of the rods'."""
     rigid, flexible = (
         run(
             ring(
                 3, boom__kind=kind, boom__base=base, structure__opening_angle=start, **UNTIL_LOCKED
-            )
+            ),
+            engine,
         )
         for kind in ("rigid", "flexible")
     )
@@ -114,7 +116,8 @@ def cable_arc(**values: Any) -> Scene:
 
 
 @pytest.mark.parametrize("values", [
-    {"boom__joint": "sleeve"}, {"boom__joint": "prismatic"}, {"boom__kind": "flexible"},
+    pytest.param({"boom__joint": "sleeve"}, marks=pytest.mark.slow), {"boom__joint": "prismatic"},
+    pytest.param({"boom__kind": "flexible"}, marks=pytest.mark.slow),
     {"boom__kind": "flexible", "boom__elements": 9},
 ], ids=["sleeve", "prismatic", "flexible", "nine-elements"])  # fmt: skip
 def test_cables_do_not_turn_a_free_arc(values: dict[str, Any]) -> None:

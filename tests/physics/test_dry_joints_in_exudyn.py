@@ -85,6 +85,7 @@ def test_accepted_states_carry_the_torque_of_the_law() -> None:
     assert max(found) < 1e-15
 
 
+@pytest.mark.slow  # long steps and few iterations are below
 def test_joints_that_stop_within_a_step_cost_few_iterations() -> None:
     """Joints lock one after the other, and each stops its neighbours: 840 iterations and a
     repeated step, with tangents alone 2151 and 49.

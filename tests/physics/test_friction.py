@@ -85,18 +85,22 @@ def test_the_equation_without_friction_is_the_quadrature() -> None:
     )
 
 
-def mark(name: str) -> object:
-    if name == "pivot-coulomb":
-        return pytest.mark.quick
-    # The coulomb friction of all joints together runs by default.
-    return () if name == "all" else pytest.mark.slow
-
-
-@pytest.mark.parametrize("name", [pytest.param(x, marks=mark(x)) for x in LAWS])
-def test_friction_slows_the_ring_as_the_ideal_equation_says(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "engine"),
+    [
+        *(
+            pytest.param(
+                x, "full", marks=pytest.mark.quick if x == "pivot-coulomb" else pytest.mark.slow
+            )
+            for x in LAWS
+        ),
+        ("all", "frame"),  # the coulomb friction of all joints together
+    ],
+)
+def test_friction_slows_the_ring_as_the_ideal_equation_says(name: str, engine: str) -> None:
     # Ten times the paper's stiffness: slow rings dwell where elasticity tells (2.5e-4 else).
     scene = ring(3, joints=LAWS[name], rods__young_modulus=120e10, **UNTIL_LOCKED)
-    found = run(scene)
+    found = run(scene, engine)
     reached, expected = found.reaches(170.0), ideal_time_with_friction(scene, 170.0)
     slowed = expected / ideal_time(scene, 170.0) - 1.0
     assert slowed > 0.02

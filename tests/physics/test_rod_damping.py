@@ -4,7 +4,7 @@ import exudyn as exu
 import numpy as np
 import pytest
 
-from ring_runs import Array, ring, run
+from ring_runs import ENGINES, Array, ring, run
 from ringsim.exudyn.assembly import Assembly
 from ringsim.exudyn.rods import GeometricallyExact
 from ringsim.layout.bodies import Pose
@@ -125,7 +125,8 @@ def test_short_steps_take_velocities_and_long_ones_differences() -> None:
     np.testing.assert_allclose(rates, 0.5 * tau * square, rtol=0.1)
 
 
-def test_what_the_rods_take_at_the_stop_is_accounted() -> None:
+@ENGINES
+def test_what_the_rods_take_at_the_stop_is_accounted(engine: str) -> None:
     """With stops that take nothing all that is lost is lost in the rods."""
     coarse, fine = (
         run(
@@ -135,7 +136,8 @@ def test_what_the_rods_take_at_the_stop_is_accounted() -> None:
                 rods__damping=1e-3,
                 stop__damping=0.0,
                 solver__tolerance=t,
-            )
+            ),
+            engine,
         )
         for t in (1e-4, 1e-5)
     )

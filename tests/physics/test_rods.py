@@ -5,12 +5,12 @@ import exudyn.itemInterface as item
 import numpy as np
 import pytest
 
-from ring_runs import ring
+from ring_runs import ENGINES, ring
 from ringsim.exudyn.assembly import Assembly
 from ringsim.exudyn.rods import GeometricallyExact, add_rod
 from ringsim.layout.bodies import Pose, Rod
 from ringsim.parts.rods import GeometricallyExactRods, Tube
-from ringsim.simulation import run
+from ringsim.simulation import FIDELITIES
 
 TUBE = Tube(outer_diameter=0.01, inner_diameter=0.009)
 
@@ -45,11 +45,12 @@ def test_a_cantilever_bends_as_it_should(elements: int) -> None:
     np.testing.assert_allclose(moved[1:], [expected, -2.0 * expected], rtol=1e-5)
 
 
-def test_one_element_bends_and_is_stressed_as_four() -> None:
+@ENGINES
+def test_one_element_bends_and_is_stressed_as_four(engine: str) -> None:
     """Differences of sections and stresses of a clamped ring, before any stop is met."""
     found = []
     for elements in (1, 4):
-        outcome = run(
+        outcome = FIDELITIES[engine](
             ring(
                 4,
                 boom__base="fixed",

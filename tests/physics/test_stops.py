@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ring_runs import ideal_time, ring, run
+from ring_runs import ENGINES, ideal_time, ring, run
 from ringsim.simulation import run as outcome_of
 from ringsim.simulation import simulate
 from ringsim.stepping.instant import Energies, Instant
@@ -146,9 +146,10 @@ def test_a_run_that_creeps_is_given_up_with_the_cure() -> None:
     assert int(outcome.values["steps"]) == 20
 
 
-def test_settling_counts_from_the_last_lock() -> None:
+@ENGINES
+def test_settling_counts_from_the_last_lock(engine: str) -> None:
     """Not from the end of the step in which it happens, which would shake every peak after it."""
     for tolerance in (1e-3, 1e-4):
         late = {"structure__opening_angle": 150.0, "solver__settling_time": 0.03}
-        found = run(ring(3, solver__tolerance=tolerance, **late))
+        found = run(ring(3, solver__tolerance=tolerance, **late), engine)
         assert found.times[-1] - found.locks.max() == pytest.approx(0.03, abs=1e-9)

@@ -94,7 +94,7 @@ def test_the_shipped_ring_folds_to_the_papers_angle_and_deploys_in_the_published
     assert run["deployment_time"].item() - time == pytest.approx(17.58, rel=1e-2)
 
 
-@pytest.mark.parametrize("fidelity", ["frame", "full"])
+@pytest.mark.parametrize("fidelity", ["frame", pytest.param("full", marks=pytest.mark.slow)])
 def test_loads_that_turn_round_fold_and_open_a_ring_by_the_quadrature(fidelity: str) -> None:
     """In both engines; the work of the loads goes on where they turn, and nothing is lost."""
     turn = 60.0
@@ -128,7 +128,7 @@ def stowed(scene: Scene, folder: Path, **solver: float) -> tuple[xr.Dataset, Pat
     return run, folder / "stow.nc"
 
 
-@pytest.mark.parametrize("settling", [0.05, 20.0])
+@pytest.mark.parametrize("settling", [pytest.param(0.05, marks=pytest.mark.slow), 20.0])
 def test_a_ring_that_was_stowed_deploys_from_that_state(tmp_path: Path, settling: float) -> None:
     """Though it had folded and settled, and also where it would settle for far longer.
 

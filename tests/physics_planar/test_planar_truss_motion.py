@@ -187,6 +187,7 @@ def test_a_pulley_with_friction_costs_the_winch():
     assert float(done.values["energy_error"]) < 1e-3
 
 
+@pytest.mark.slow  # tests/stability/test_guarded_runs.py: too coarse steps of other scenes
 def test_winding_up_the_whole_rope_fails_with_a_reason():
     winding = {"kind": "constant", "speed": 20.0}
     values = {"cables.upper.winch.winding": winding, "solver.end_time": 0.1, "solver.restarts": 0}

@@ -32,7 +32,8 @@ def ran(**values: Any) -> xr.Dataset:
 
 
 @pytest.mark.parametrize("values", [
-    {"end": "both"}, {"end": "last"}, {"bracket": HALF}, {"end": "last", "bracket": HALF},
+    {"end": "both"}, {"end": "last", "bracket": HALF},
+    *(pytest.param(each, marks=pytest.mark.slow) for each in ({"end": "last"}, {"bracket": HALF})),
 ], ids=str)  # fmt: skip
 def test_series_belong_to_their_spans(values: dict[str, Any]) -> None:
     run = ran(**values)

@@ -28,7 +28,7 @@ from ringsim.plots.campaign.endings import angle_grid, base_load, laid_on, margi
 from ringsim.plots.campaign.frame import moves, shown
 from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
 from ringsim.plots.campaign.tornado import bars_of, named, one_by_one
-from ringsim.plots.figures import PICTURES, draw_figures, figures_of
+from ringsim.plots.figures import PICTURES, figures_of
 from ringsim.variables import Fate
 
 GOOD = [0, 1, 3, 4, 6]
@@ -223,13 +223,11 @@ def test_all_figures_of_a_file(tmp_path: Path, mixed: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize("choice", [{"failed": (0, 1)}, {"not_run": (0, 1)}, {"stalled": (0, 1)}])
-def test_campaigns_in_which_nothing_deployed(
-    choice: dict[str, tuple[int, ...]], tmp_path: Path
-) -> None:
-    names = {path.stem for path in draw_figures(made_campaign(2, **choice), tmp_path, "campaign")}
+def test_campaigns_in_which_nothing_deployed(choice: dict[str, tuple[int, ...]]) -> None:
+    names = {picture.name for picture, _ in figures_of(made_campaign(2, **choice))}
     stalled = {"distributions", "convergence", "fan", "lag_map", "tension", "by_input"}
     expected = stalled if "stalled" in choice else {"by_input"} if "failed" in choice else set()
-    assert names == {f"campaign-fig-{name}" for name in expected}
+    assert names == expected
 
 
 def test_a_campaign_without_asynchrony_has_no_fan() -> None:
@@ -504,7 +502,7 @@ def test_the_course_of_the_margin_begins_where_runs_begin() -> None:
     assert np.isnan(laid[3, [0, -1]]).all()
 
 
-@pytest.mark.parametrize("kind", ["random", "one-at-a-time"])
+@pytest.mark.parametrize("kind", ["random", pytest.param("one-at-a-time", marks=pytest.mark.slow)])
 def test_stress_has_the_numbers_of_its_unit_in_all_figures(kind: str) -> None:
     campaign = made_campaign(12)
     campaign.attrs["design"] = json.dumps({"kind": kind})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 
 import numpy as np
@@ -40,18 +41,30 @@ def words(figure: Figure) -> str:
     return " ".join(" ".join(each.get_text() for each in every).split())
 
 
+@functools.cache
+def told(kind: str, samples: int) -> dict[str, str]:
+    """What all figures say, by their names."""
+    campaign = single_changes(samples)
+    campaign.attrs["design"] = json.dumps({"kind": kind})
+    return {each.name: words(figure) for each, figure in figures_of(campaign)}
+
+
 def lines_of(axes: Axes) -> list[np.ndarray]:
     """Values of the lines that are curves, without limits and zeros."""
     return [each.get_ydata() for each in axes.lines if len(each.get_xdata()) > 2]
 
 
 @pytest.mark.parametrize(
-    ("kind", "samples"), [("one-at-a-time", 12), ("one-at-a-time", 5), ("grid", 5), ("list", 5)]
+    ("kind", "samples"),
+    [
+        ("one-at-a-time", 12),
+        ("one-at-a-time", 5),
+        ("grid", 5),
+        pytest.param("list", 5, marks=pytest.mark.slow),
+    ],
 )
 def test_no_figure_tells_an_average_of_cases(kind: str, samples: int) -> None:
-    campaign = single_changes(samples)
-    campaign.attrs["design"] = json.dumps({"kind": kind})
-    drawn = {each.name: words(figure) for each, figure in figures_of(campaign)}
+    drawn = dict(told(kind, samples))
     assert {"fan", "lag_map", "margin", "motors", "base", "latch_rate", "tension"} <= drawn.keys()
     drawn.pop("tornado", None)  # ranks of inputs need no population
     for name, text in drawn.items():
@@ -137,7 +150,7 @@ def test_the_player_offers_the_base_case() -> None:
 
 
 def test_angles_have_one_unit_in_all_figures() -> None:
-    for one in (single_changes(5), with_motors(made_campaign(8))):
-        told = {each.name: words(figure) for each, figure in figures_of(one)}
-        assert "(deg)" in told["fan"]
-        assert not [name for name, text in told.items() if "degree" in text]
+    many = {each.name: words(one) for each, one in figures_of(with_motors(made_campaign(8)))}
+    for one in (told("one-at-a-time", 5), many):
+        assert "(deg)" in one["fan"]
+        assert not [name for name, text in one.items() if "degree" in text]

@@ -69,7 +69,13 @@ def test_names_stay_in_their_corner_where_nothing_is_in_the_way() -> None:
     assert axes.texts[0].get_position() == (0.02, 0.95)
 
 
-@pytest.mark.parametrize("draw", [opening_angles, asynchrony, rod_stress])
+@pytest.mark.parametrize(
+    "draw",
+    [
+        *(pytest.param(each, marks=pytest.mark.slow) for each in (opening_angles, asynchrony)),
+        rod_stress,
+    ],
+)
 def test_figures_of_a_ring_that_opens_at_once(draw, deployed: xr.Dataset) -> None:
     run = deployed.copy(deep=True)
     late = run.time.values > 0.3

@@ -49,9 +49,9 @@ KINDS = {
 
 @pytest.fixture
 def _undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pages with a figure or two, where words and tables are what matters."""
-    few = [each for each in of_campaigns.PICTURES if each.name in ("by_input", "distributions")]
-    monkeypatch.setattr(of_campaigns, "PICTURES", few)
+    """Pages without figures and player, where words and tables are what matters."""
+    monkeypatch.setattr(of_campaigns, "PICTURES", [])
+    monkeypatch.setattr(model, "player", lambda *_: None)
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -126,8 +126,9 @@ def test_the_page_has_no_figure_of_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     assert 'id="figure-tornado"' not in text
 
 
-@pytest.mark.usefixtures("_undrawn")
 def test_a_page_that_would_be_too_large_has_pictures_for_lines(monkeypatch) -> None:
+    own = [each for each in of_campaigns.PICTURES if each.name == "distributions"]
+    monkeypatch.setattr(of_campaigns, "PICTURES", own)
     campaign = made_campaign(8)
     lines = page(campaign, "runs/made")
     monkeypatch.setattr(shell, "LARGEST", len(lines.encode()) - 1)
@@ -564,6 +565,7 @@ def test_printed_figures_fill_their_sheets() -> None:
     assert made[2][0] == 0.85  # what is alone is drawn larger
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_long_heads_may_be_broken_at_underscores() -> None:
     """Else tables of many outputs are wider than paper, and browsers print all pages smaller."""
     campaign = made_campaign(4)

@@ -1,4 +1,4 @@
-"""The full model against a ring of rigid rods: they share no integration and no mechanics.
+"""Elastic rods against a ring of rigid ones: they share no integration and no mechanics.
 
 What is left between them is the rods' elasticity.  It holds the mean angle back in proportion to
 the driving forces and to 1 / E, and lets the sections open apart, which lowers the tension at the
@@ -16,7 +16,7 @@ import pytest
 from rigid_motion import Course, RigidRing
 
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import run
+from ringsim.simulation import FIDELITIES
 from ringsim.variables import Outcome
 from small_rings import six
 
@@ -46,8 +46,11 @@ class Pair:
         return np.asarray((1.0 - self.tension / self.rigid_tension)[:, where])
 
 
+ENGINES = pytest.mark.parametrize("engine", ["frame", pytest.param("full", marks=pytest.mark.slow)])
+
+
 def both(scene: Scene) -> Pair:
-    full = run(scene)
+    full = FIDELITIES["full"](scene)
     return beside(RigidRing(scene).course(full.coordinates["time"]), full)
 
 
@@ -74,15 +77,16 @@ def six_sections(**values: Any) -> Scene:
 
 
 @functools.cache
-def usual() -> tuple[Course, Pair]:
+def usual(engine: str) -> tuple[Course, Pair]:
     """Whatever its rods are made of; and with usual ones."""
-    full = run(six_sections())
+    full = FIDELITIES[engine](six_sections())
     rigid = RigidRing(six_sections()).course(full.coordinates["time"])
     return rigid, beside(rigid, full)
 
 
-def test_six_sections_move_as_rigid_rods():
-    pair = usual()[1]
+@ENGINES
+def test_six_sections_move_as_rigid_rods(engine: str) -> None:
+    pair = usual(engine)[1]
     whole = pair.rigid < WHOLE
     assert whole.sum() > 150
     assert pair.held_back(whole).max() < ANGLE
@@ -91,10 +95,11 @@ def test_six_sections_move_as_rigid_rods():
     assert np.abs(pair.missing(taut)).max() < TENSION / 3.0
 
 
-def test_what_is_left_is_elasticity():
+@ENGINES
+def test_what_is_left_is_elasticity(engine: str) -> None:
     hard_rods = six_sections(solver__end_time=4.0, rods__young_modulus=480e9)
-    rigid, soft = usual()
-    hard = beside(rigid, run(hard_rods))
+    rigid, soft = usual(engine)
+    hard = beside(rigid, FIDELITIES[engine](hard_rods))
     late = (hard.times > 1.5) & (hard.times < 3.9)
     first = np.append(late, np.zeros(len(soft.times) - len(late), dtype=bool))
     ratio = soft.held_back(first) / hard.held_back(late)

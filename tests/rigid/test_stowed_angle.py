@@ -10,7 +10,7 @@ from ringsim.cli import cli
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene
-from ringsim.simulation import run
+from ringsim.simulation import FIDELITIES, run
 from ringsim.stowed_angle import opening_angle_for
 from small_rings import pulled, six
 
@@ -29,10 +29,11 @@ def test_the_quadrature_deploys_in_the_time_asked_for() -> None:
     assert truth.time == pytest.approx(WANTED, rel=5e-4)
 
 
-def test_the_full_model_with_friction_deploys_in_that_time() -> None:
+@pytest.mark.parametrize("engine", ["frame", pytest.param("full", marks=pytest.mark.slow)])
+def test_elastic_rods_with_friction_deploy_in_that_time(engine: str) -> None:
     joints = {"vjoint": {"viscous": 0.002}}
     scene = pulled(3, net="none", joints=joints, rods__damping=0.0, solver__settling_time=0.0)
-    found = run(stowed(scene, opening_angle_for(scene, WANTED)))
+    found = FIDELITIES[engine](stowed(scene, opening_angle_for(scene, WANTED)))
     assert float(found.values["deployment_time"]) == pytest.approx(WANTED, rel=3e-4)
 
 

@@ -1,5 +1,6 @@
 """Mistakes that a new user makes: one line that names field, value, bound and cure."""
 
+import functools
 import os
 import pty
 import re
@@ -385,6 +386,13 @@ def test_a_refusal_of_a_part_tells_value_and_cure(values: dict[str, object], tex
         load_scene("ring18-motor").with_values(values)
 
 
+@functools.cache
+def checked_motors(*more: str) -> str:
+    told = CliRunner().invoke(cli, ["check", "ring18-motor", *more])
+    assert told.exit_code == 0, told.output
+    return told.output
+
+
 @for_each(
     ("value", "words"),
     [
@@ -418,9 +426,8 @@ def test_values_that_nobody_means_are_told_and_not_refused(value: str, words: st
     """Half a bar of ring18 has 0.289 m, its rods weigh 1.287 kg; a scene as it is has none."""
     settings = [word for each in value.split() for word in ("--set", each)]
     for more in ([], settings):
-        told = CliRunner().invoke(cli, ["check", "ring18-motor", *more])
-        assert told.exit_code == 0, told.output
-        lines = [line for line in told.output.splitlines() if line.startswith("doubtful: ")]
+        told = checked_motors(*more)
+        lines = [line for line in told.splitlines() if line.startswith("doubtful: ")]
         assert len(lines) == bool(more)
         assert all(words in line for line in lines), lines
-        assert told.output.splitlines()[-1].startswith("valid")
+        assert told.splitlines()[-1].startswith("valid")

@@ -49,7 +49,14 @@ def test_bad_scene_gets_one_line_with_file_field_and_cure(key: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    "key", ["unknown-key-solver", "range-not a number", "broken-binary", "impossible-no forces"]
+    "key",
+    [
+        "unknown-key-solver",
+        *(
+            pytest.param(key, marks=pytest.mark.slow)
+            for key in ("range-not a number", "broken-binary", "impossible-no forces")
+        ),
+    ],
 )
 def test_the_installed_command_ends_alike(key: str, tmp_path: Path) -> None:
     bad = BAD_SCENES[key]

@@ -114,7 +114,7 @@ def test_help_lists_the_verb(verb: str) -> None:
     assert verb in run("--help")
 
 
-@pytest.mark.parametrize("verb", ["check", "run"])
+@pytest.mark.parametrize("verb", [pytest.param("check", marks=pytest.mark.slow), "run"])
 def test_a_reader_that_stops_reading_costs_no_result(verb: str, tmp_path: Path) -> None:
     """As ``ringsim run ... | head -1`` does."""
     out = tmp_path / "pipe.nc"
@@ -136,7 +136,7 @@ def test_a_reader_that_stops_reading_costs_no_result(verb: str, tmp_path: Path) 
     [
         (">&- 2>&-", 0, ""),
         (">/dev/full", 2, "standard output cannot be written: No space left"),
-        ("2>/dev/full", 0, ""),
+        pytest.param("2>/dev/full", 0, "", marks=pytest.mark.slow),
     ],
     ids=["closed", "full", "full-error"],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 import pytest
 
@@ -11,7 +12,7 @@ from ringsim.exudyn.build import build
 from ringsim.exudyn.integrate import Integration
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame
-from ringsim.variables import Fate, Status
+from ringsim.variables import Fate, Outcome, Status
 
 
 def ring(**solver) -> Scene:
@@ -30,11 +31,18 @@ def ring(**solver) -> Scene:
     )
 
 
+Solve = Callable[[Scene], Outcome]
+ENGINES = pytest.mark.parametrize(
+    "solve",
+    [pytest.param(run_frame, id="frame"), pytest.param(run, id="full", marks=pytest.mark.slow)],
+)
+"""Both are under the same guard."""
 COARSE = {"step_control": "constant", "step": 0.1, "restarts": 0}
 
 
-def test_a_sound_run_is_left_alone() -> None:
-    outcome = run(ring())
+@ENGINES
+def test_a_sound_run_is_left_alone(solve: Solve) -> None:
+    outcome = solve(ring())
     assert outcome.status is Status.OK
     assert int(outcome.values["restarts"]) == 0
     assert float(outcome.values["energy_error"]) < ring().solver.energy_tolerance
@@ -52,9 +60,10 @@ def test_a_run_with_absurd_steps_stops_early_with_its_cause() -> None:
     assert int(outcome.values["steps"]) < int(unguarded.values["steps"])
 
 
-def test_too_coarse_steps_are_cured_by_a_new_start() -> None:
+@ENGINES
+def test_too_coarse_steps_are_cured_by_a_new_start(solve: Solve) -> None:
     coarse = ring(step_control="constant", step=0.02)
-    outcome = run(coarse)
+    outcome = solve(coarse)
     assert outcome.status is Status.OK
     assert float(outcome.values["energy_error"]) < coarse.solver.energy_tolerance
     assert 1 <= int(outcome.values["restarts"]) <= coarse.solver.restarts
@@ -71,10 +80,13 @@ def test_constant_steps_that_newton_has_to_cut_are_too_few() -> None:
     assert float(outcome.values["energy_error"]) < ring().solver.energy_tolerance
 
 
-def test_a_joint_driven_far_past_a_stop_that_is_too_soft_is_an_outcome_not_a_failure() -> None:
+@ENGINES
+def test_a_joint_driven_far_past_a_stop_that_is_too_soft_is_an_outcome_not_a_failure(
+    solve: Solve,
+) -> None:
     """The energy balance holds, so that the numbers do; smaller steps would find the same."""
     soft = ring(restarts=0).with_values({"loads.force": 10.0, "stop.stiffness": 1e-3})
-    outcome = run(soft.with_values({"stop.damping": 0.0}))
+    outcome = solve(soft.with_values({"stop.damping": 0.0}))
     assert outcome.status is Status.OK
     assert outcome.fate is Fate.OVERLOADED
     assert int(outcome.values["restarts"]) == 0
@@ -135,7 +147,10 @@ def test_a_ring_that_is_nearly_open_does_not_lock_within_its_first_step() -> Non
     assert times[0] == pytest.approx(times[1], rel=0.01)  # what ok promises
 
 
-def test_the_jerk_of_a_winch_that_starts_at_once_does_not_depend_on_the_largest_step() -> None:
+@ENGINES
+def test_the_jerk_of_a_winch_that_starts_at_once_does_not_depend_on_the_largest_step(
+    solve: Solve,
+) -> None:
     """It throws the ring into a swing on its ropes, with the largest tension of the run."""
     jerk = load_scene("truss2").with_values(
         {
@@ -147,7 +162,7 @@ def test_the_jerk_of_a_winch_that_starts_at_once_does_not_depend_on_the_largest_
         }
     )
     peaks = [
-        float(run(jerk.with_values(values)).values["peak_tension"])
+        float(solve(jerk.with_values(values)).values["peak_tension"])
         for values in (
             {"solver.step": 0.1, "solver.tolerance": 0.1},
             {"solver.step": 0.01, "solver.tolerance": 1e-4},
@@ -169,7 +184,7 @@ def test_an_error_of_our_own_inside_the_solver_is_not_called_a_failure_of_the_so
         integration.run()
 
 
-@pytest.mark.parametrize("step", [0.2, 0.05])
+@pytest.mark.parametrize("step", [0.2, pytest.param(0.05, marks=pytest.mark.slow)])
 def test_constant_steps_that_miss_a_ropes_swing_are_not_ok(step: float) -> None:
     """The truss is thrown within 40 ms: such steps have its largest tension wrong by 7 to 13 %."""
     short = {"solver.end_time": 1.0, "solver.step_control": "constant", "solver.restarts": 0}

@@ -5,7 +5,7 @@ import pytest
 
 from ringsim.parts.solver import Solver
 from ringsim.scene import load_scene
-from ringsim.simulation import run
+from ringsim.simulation import run_frame
 from ringsim.stepping import repeats
 from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.repeats import EnergyImbalance
@@ -68,9 +68,9 @@ def test_a_run_tells_that_its_patience_ended(monkeypatch: pytest.MonkeyPatch) ->
         {"structure.sections": 3, "structure.aspect_ratio": 1.0, "net": "none", "boom": "none",
          "loads.force": 0.03, "structure.opening_angle": 150.0}
     )  # fmt: skip
-    assert "accepted as they were" not in run(scene).reason
+    assert "accepted as they were" not in run_frame(scene).reason
     monkeypatch.setattr(repeats, "PATIENCE", 1)
     assert (
         "steps repeated to keep the energy balance: 1, further ones were accepted"
-        in run(scene).reason
+        in run_frame(scene).reason
     )

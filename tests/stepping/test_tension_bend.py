@@ -83,7 +83,7 @@ def slow_ring(**values: object) -> Scene:
     return load_scene("ring18-cable").with_values(plain | values)
 
 
-@pytest.mark.parametrize("engine", [run_frame, run])
+@pytest.mark.parametrize("engine", [run_frame, pytest.param(run, marks=pytest.mark.slow)])
 def test_the_tension_of_the_last_lock_is_found(engine: Callable[[Scene], Outcome]) -> None:
     """It rises by 10 N/s there; the energy balance alone let steps of 33 ms cross it.
 
