@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -17,6 +18,24 @@ from campaign_bench import MODULES, PATH, Bench, comparable, ranks_of, records
 
 SCRIPTS = Path(__file__).parents[2] / "slurm"
 SAMPLES = 24
+ENDS = {"exit 130": 130, "kill -USR1 $$": 138, "exit 3": 3}
+
+
+@pytest.mark.parametrize("script", ["array.sbatch", "mpi.sbatch"])
+@pytest.mark.parametrize("ends", ENDS)
+def test_a_job_that_the_warning_ended_is_started_again(script, ends, tmp_path):
+    """Also where it came while the command could not listen; failures are left as they are."""
+    commands = {"ringsim": ends, "srun": ends, "scontrol": f'echo "$1" >> {tmp_path}/asked'}
+    for name, text in commands.items():
+        (tmp_path / name).write_text(f"#!/bin/bash\n{text}\n", encoding="utf-8")
+        (tmp_path / name).chmod(0o755)
+    path = f"{tmp_path}:{os.environ['PATH']}"
+    done = subprocess.run(
+        ["bash", str(SCRIPTS / script), "FILE"], env=os.environ | {"PATH": path}, check=False
+    )
+    asked = tmp_path / "asked"
+    assert (asked.read_text() if asked.exists() else "") == "requeue\n" * (ends != "exit 3")
+    assert done.returncode == ENDS[ends]
 
 
 @pytest.fixture(scope="module")
