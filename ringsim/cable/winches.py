@@ -339,6 +339,32 @@ class Winches:
             if ahead and not isinstance(self._winches[place].winding, FeedbackWinding):
                 self._ahead[place] = ahead
 
+    def command(self, time: float, speeds: Mapping[tuple[int, int], float]) -> bool:
+        """Let winches that are on have the speeds (m/s) that a controller commands at a time (s);
+        returns whether any law has changed.
+        """
+        changed = False
+        for place, speed in speeds.items():
+            winch = self._winches[place]
+            if winch.turns(time + AT_ONCE):
+                law = winch.winding.told(speed, time - winch.start_time)
+                changed |= law is not winch.winding
+                self._winches[place] = winch.model_copy(update={"winding": law})
+        return changed
+
+    def next_bend(self, time: float) -> float:
+        """Where a law bends next after a time (s), s; infinite if none does."""
+        bends = (bend for winch in self._winches.values() for bend in winch.breaks())
+        return min((bend for bend in bends if bend > time + AT_ONCE), default=math.inf)
+
+    def commands(self) -> Array:
+        """What motors are told, rad/s of their shafts, shape (cables, 2); NaN without a motor."""
+        found = np.full(self._held.shape, math.nan)
+        for place, winch in self._winches.items():
+            if (motor := winch.winding.motor) is not None:
+                found[place] = motor.fastest
+        return found
+
     def lock(self, number: int, time: float, state: ChainState) -> None:
         """The plane of a cable has locked at a time (s): its winches do what they do then."""
         for place, winch in self._winches.items():

@@ -89,12 +89,15 @@ class Motors(Output):
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
-        """Tension (N), speed (m/s) and rope wound (m) of every winch, (planes, 2, 3)."""
-        if now.chain is None:
+        """Tension (N), speed (m/s), rope wound (m) and command (rad/s) of every winch, shape
+        (planes, 2, 4).
+        """
+        if now.chain is None or now.commands is None:
             return None
-        found = np.full((len(now.angles), 2, 3), np.nan)
+        found = np.full((len(now.angles), 2, 4), np.nan)
         chain = now.chain
-        own = np.stack([chain.winch_tensions, chain.wound_rate, chain.wound], axis=-1)
+        each = chain.winch_tensions, chain.wound_rate, chain.wound, now.commands
+        own = np.stack(each, axis=-1)
         for planes, value in zip(now.planes, own, strict=True):
             found[list(planes)] = value
         return found
@@ -108,7 +111,9 @@ class Motors(Output):
         current, supplied, lost = np.full((3, *torque.shape), np.nan)
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
-            tension, speed, wound = series.values[:, plane, end].T
+            tension, speed, wound, told = series.values[:, plane, end].T
+            if run.scene.controller is not None:
+                motor = motor.model_copy(update={"speed": told, "ramp": None})
             runs = np.array([winch.turns(time + AT_ONCE) for time in times], dtype=bool)
             if winch.after_lock == "stop":
                 runs &= times <= np.nan_to_num(held[plane].max(), nan=math.inf)

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from ringsim.cable.faults import CableFault
+from ringsim.cable.ropes import CableFault
 from ringsim.cable.friction import PulleyFriction
 from ringsim.cable.records import CABLES
 from ringsim.choice import OneOf, kinds_of

@@ -19,6 +19,8 @@ def check_parts(scene: "Scene") -> None:
     _check_limits(scene)
     _check_latch(scene)
     _check_margin(scene)
+    if scene.controller is not None:
+        scene.controller.check(scene)
 
 
 def _check_limits(scene: "Scene") -> None:

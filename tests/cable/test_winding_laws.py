@@ -15,13 +15,13 @@ from scipy.integrate import quad, solve_ivp
 from cable_cases import LAWS, cable, random_case, still, wind
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winches import Winches
+from ringsim.cable.control import TensionFeedbackWinding
 from ringsim.cable.winding import (
     ConstantWinding,
     MotorWinding,
     RampWinding,
     StallWinding,
     TableWinding,
-    TensionFeedbackWinding,
     Winding,
 )
 from ringsim.choice import kinds_of
