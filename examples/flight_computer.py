@@ -1,8 +1,6 @@
 """A program steps the run: a flight computer that keeps both planes in step, with a sensor lost.
 
-The loop below could be a flight computer's own code.  One that comes as a functional mock-up
-(FMU) stands in the same place: with FMPy, ``fmu.setReal`` of the readings, ``fmu.doStep``, and
-``fmu.getReal`` of the speeds.
+The loop below could be a flight computer's own code, or the steps of its functional mock-up.
 """
 
 import numpy as np

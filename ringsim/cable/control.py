@@ -195,7 +195,8 @@ class Controller(Model):
     @property
     def scene(self) -> "Scene":
         """What is run."""
-        return self._scene
+        scene: Scene = self._scene
+        return scene
 
     @property
     def state(self) -> dict[str, Any]:
@@ -383,8 +384,7 @@ class Outside(Controller):
 
     def step(self, time: float, readings: Readings) -> Mapping[str, float] | None:
         """See ``Controller``."""
-        ask: Callable[[float, Readings], Mapping[str, float]] | None
-        ask = getattr(OUTSIDE, "ask", None)
+        ask: Callable[[float, Readings], Mapping[str, float]] | None = getattr(OUTSIDE, "ask", None)
         if ask is None:
             raise ValueError(
                 'controller.kind = "outside": only ringsim.steps in Python commands it: step the '

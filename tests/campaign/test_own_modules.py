@@ -97,7 +97,7 @@ design = {{ kind = "random", samples = 4 }}
 "cables.upper.friction.speed" = 1e-3
 "cables.upper.winch.winding" = {{ kind = "commanded", max_speed = 0.1 }}
 "cables.lower.winch.winding" = {{ kind = "commanded", max_speed = 0.1 }}
-controller = {{ kind = "{word}", period = 0.25, speed = 0.01, encoder = {{ standard_deviation = 0.1 }} }}
+controller = {{ kind = "{word}", period = 0.25, speed = 0.01, encoder.bias = 0.1 }}
 
 [inputs]
 "cables.upper.friction.coefficient" = {{ kind = "{word}-half", low = 1e-4, high = 9e-4 }}

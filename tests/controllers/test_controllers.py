@@ -1,4 +1,4 @@
-"""Controllers that sample sensors and command winches: closed forms, both engines, stored states."""
+"""Controllers that sample sensors and command winches: closed forms, both engines, states."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ def test_a_commanded_rotor_gives_what_its_present_command_asks_for() -> None:
     """As of any rotor, whose command is not that of the scene; the brake takes nothing here."""
     inertia, told = 1e-6, 100.0 * TRAVEL
     rotor = MOTOR | {"speed": 300.0, "rotor_inertia": inertia}
-    values: dict[str, Any] = {f"cables.{p}.winch.winding": rotor for p in ("upper", "lower")}
+    values: dict[str, object] = {f"cables.{p}.winch.winding": rotor for p in ("upper", "lower")}
     values["controller"] = {"kind": "synchronise", "period": 0.2, "speed": told, "gain": 0.0}
     scene = ring(structure__sections=3, solver__end_time=0.6, solver__tolerance=3e-4)
     found = simulate(scene.with_values(values), "frame")
