@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ringsim.cable import friction
-from ringsim.cable.control import OUTSIDE, Readings
+from ringsim.cable.control import OUTSIDE, Outside, Readings, checked, places_of
 from ringsim.choice import kind_of
 from ringsim.outputs.balance import with_bars
 from ringsim.outputs.recorder import StoredState
@@ -145,6 +145,11 @@ def _run(
     """
     begin = (time.perf_counter(), time.process_time())
     scene = substituted(scene)
+    if isinstance(scene.controller, Outside) and not hasattr(OUTSIDE, "ask"):
+        raise InputError(
+            'controller.kind = "outside": only ringsim.steps in Python commands it: step the scene '
+            "there, or choose another kind"
+        )
 
     def start(variant: Scene) -> Outcome:
         """One start; times count from the first."""
@@ -279,26 +284,48 @@ class Steps:
 
     def __init__(self, scene: Scene, fidelity: str) -> None:
         self.time = 0.0
-        self._scene, self._fidelity = scene, fidelity
+        self._scene, self._fidelity, self._winches = scene, fidelity, places_of(scene)
         self._told: dict[str, float] = {}
-        self._shown: SimpleQueue[tuple[float, Readings] | Outcome | BaseException]
-        self._answers: SimpleQueue[Mapping[str, float] | None]
         self._outcome: Outcome | None = None
 
     def command(self, **speeds: float) -> None:
         """Speeds (m/s) for winches by name, which they have from the sample's time and the
-        controller's ``delay`` on; ``command(**{"upper far": 0.1})`` for a second winch.
+        controller's ``delay`` on; ``command(**{"upper far": 0.1})`` for a second winch.  InputError
+        if there is no such winch, or it takes no commands.
         """
-        self._told |= speeds
+        try:
+            self._told |= checked(speeds, self._winches, "command")
+        except ValueError as error:
+            raise InputError(str(error)) from None
 
     def __iter__(self) -> Iterator[Readings]:
         self._outcome, self._told = None, {}
-        self._shown, self._answers = SimpleQueue(), SimpleQueue()
-        thread = threading.Thread(target=self._run, name="ringsim.steps", daemon=True)
+        shown: SimpleQueue[tuple[float, Readings] | Outcome | BaseException] = SimpleQueue()
+        answers: SimpleQueue[Mapping[str, float] | None] = SimpleQueue()
+        left = threading.Event()
+
+        def ask(time: float, readings: Readings) -> Mapping[str, float]:
+            shown.put((time, readings))
+            if (answer := answers.get()) is None:
+                raise _StoppedError
+            return answer
+
+        def watch(now: Instant) -> None:
+            if left.is_set():
+                raise _StoppedError
+
+        def work() -> None:
+            OUTSIDE.ask = ask
+            try:
+                shown.put((run if self._fidelity == "full" else run_frame)(self._scene, watch))
+            except BaseException as error:  # for the thread that iterates
+                shown.put(error)
+
+        thread = threading.Thread(target=work, name="ringsim.steps", daemon=True)
         thread.start()
         try:
             while True:
-                found = self._shown.get()
+                found = shown.get()
                 if isinstance(found, BaseException):
                     raise found
                 if isinstance(found, Outcome):
@@ -307,9 +334,10 @@ class Steps:
                 self.time, readings = found
                 yield readings
                 told, self._told = self._told, {}
-                self._answers.put(told)
+                answers.put(told)
         finally:
-            self._answers.put(None)
+            left.set()
+            answers.put(None)
             thread.join()
 
     @property
@@ -320,19 +348,6 @@ class Steps:
         if self._outcome is None:
             raise RuntimeError("the run has not ended: iterate over all of its steps first")
         return to_dataset(self._outcome, self._scene)
-
-    def _run(self) -> None:
-        def ask(time: float, readings: Readings) -> Mapping[str, float]:
-            self._shown.put((time, readings))
-            if (answer := self._answers.get()) is None:
-                raise _StoppedError
-            return answer
-
-        OUTSIDE.ask = ask
-        try:
-            self._shown.put(FIDELITIES[self._fidelity](self._scene))
-        except BaseException as error:  # for the thread that iterates
-            self._shown.put(error)
 
 
 def steps(
@@ -347,7 +362,8 @@ def steps(
         commands.  A ``controller`` of kind "outside" says how it is sampled: delay, errors of
         sensors.
     fidelity
-        "frame" or "full", see ``simulate``.
+        "frame" or "full", see ``simulate``; either without restarts and error bars, for which the
+        loop would have to decide again.
     period
         Time between samples, s, in place of that of the scene's controller.
 

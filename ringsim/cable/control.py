@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, model_validator
 
 from ringsim.cable.winding import FeedbackWinding, PrescribedWinding, WinchReading
 from ringsim.choice import kind_of
@@ -64,22 +64,42 @@ class CommandedWinding(PrescribedWinding):
     speed: Speed = 0.0
     """Commanded last; until the first command, from the start on."""
     begun: SecondOrZero = 0.0
-    """When that was, since the start of the winch."""
+    """Written by runs: when that was, since the start of the winch."""
     from_speed: Speed = 0.0
-    """Speed that it had then."""
+    """Written by runs: the speed that it had then."""
     wound_before: SignedMetre = 0.0
-    """Rope that it had wound by then."""
+    """Written by runs: the rope that it had wound by then."""
     commandable: ClassVar[bool] = True
 
     def usual_speed(self) -> float:
         """Half of the fastest, or the speed before the first command, in m/s."""
         return abs(self.speed) or 0.5 * self.max_speed
 
+    @model_validator(mode="after")
+    def _within(self) -> "CommandedWinding":
+        if not -self.max_payout <= self.speed <= self.max_speed:
+            raise ValueError(
+                f"speed = {self.speed} m/s must lie between -max_payout = {-self.max_payout} and "
+                f"max_speed = {self.max_speed} m/s"
+            )
+        return self
+
     def told(self, speed: float, time: float) -> Self:
         """See ``Winding``."""
-        now = {"begun": time, "from_speed": self.wound_rate(time), "wound_before": self.wound(time)}
         cut = min(max(speed, -self.max_payout), self.max_speed)
+        if cut == self.speed:
+            return self
+        now = {"begun": time, "from_speed": self.wound_rate(time), "wound_before": self.wound(time)}
         return self.model_copy(update={**now, "speed": cut})
+
+    @property
+    def told_before(self) -> bool:
+        """Whether it has the fields that a run writes, which no scene may give."""
+        return bool(self.begun or self.from_speed or self.wound_before)
+
+    def commanded_speed(self) -> float:
+        """Commanded last, in m/s."""
+        return self.speed
 
     def breaks(self) -> tuple[float, ...]:
         """Where the commanded speed is reached, s."""
@@ -187,7 +207,7 @@ class Controller(Model):
 
     def begin(self, scene: "Scene") -> Self:
         """A copy for one run of a scene."""
-        own = self.model_copy()
+        own = self.model_copy(deep=True)
         own._scene, own._state = scene, {}
         own.reset()
         return own
@@ -228,6 +248,11 @@ class Controller(Model):
                     f"controller: commands the motor of the {name} winch, whose command must then "
                     "not rise by itself: leave its ramp out, or controller"
                 )
+            if winch.winding.motor is not None and winch.winding.motor.speed is None:
+                raise ValueError(
+                    f"controller: commands the motor of the {name} winch, which would run at full "
+                    "voltage until the first command: give its speed"
+                )
 
     def sampler(self, scene: "Scene") -> "Sampler":
         """What lets it sample in one run of a scene."""
@@ -236,10 +261,11 @@ class Controller(Model):
 
 def named_winches(scene: "Scene") -> dict[str, Any]:
     """The winches of a scene by the names that controllers use."""
-    return {name: winch for name, (_, winch) in _places(scene).items()}
+    return {name: winch for name, (_, winch) in places_of(scene).items()}
 
 
-def _places(scene: "Scene") -> dict[str, tuple[Place, Any]]:
+def places_of(scene: "Scene") -> dict[str, tuple[Place, Any]]:
+    """The same, each with its place."""
     cables = [] if scene.cables is None else scene.cables.present()
     return {
         f"{scene.structure.planes[plane]}{' far' if end else ''}": ((number, end), winch)
@@ -298,7 +324,7 @@ class TensionFeedbackWinding(FeedbackWinding):
 
 
 class Synchronise(Controller):
-    """The winch of the plane that is behind winds faster, that of the plane ahead more slowly:
+    """The winch of the plane that is behind winds faster, that of the plane ahead more slowly.
 
         speed of a plane's winches = speed * (1 + gain * (mean - own)),
 
@@ -337,13 +363,14 @@ class Synchronise(Controller):
 
 
 class SampledTension(Controller):
-    """The law of "tension-feedback" windings as a computer has it: at each sample
+    """The law of "tension-feedback" windings as a computer has it, with new values at each sample.
 
         speed = take-up + gain * (target - T),   take-up = -dS/d(delta) * opening_rate,
 
     with the tension T that the load cell shows and the path S of the rope at the angles that the
     encoders show; see ``TensionFeedbackWinding``.  Held from sample to sample it is stable for
-    period * gain < 2 S / EA at most, without delay.
+    period * gain < 2 S / EA at most, without delay.  A plane whose encoders are all silent counts
+    as open.
     """
 
     kind: Literal["sampled-tension"] = "sampled-tension"
@@ -399,6 +426,27 @@ class Outside(Controller):
 # Sampling in a run.
 
 
+def checked(told: Any, winches: Mapping[str, tuple[Place, Any]], where: str) -> dict[str, float]:
+    """Commands as plain numbers; ValueError, which begins with ``where``, if they are none."""
+    if not isinstance(told, Mapping):
+        raise ValueError(f"{where}: gives {told!r}: must be speeds (m/s) by winch, or None")
+    for name, speed in told.items():
+        if name not in winches:
+            known = ", ".join(winches) or "none"
+            raise ValueError(f'{where}: commands a winch "{name}" (there are: {known})')
+        if not winches[name][1].winding.commandable:
+            kind = kind_of(winches[name][1].winding)
+            raise ValueError(
+                f'{where}: commands the winch "{name}", whose winding of kind "{kind}" takes no '
+                'commands: choose "commanded" or "motor"'
+            )
+        if not isinstance(speed, (int, float, np.number)) or not math.isfinite(speed):
+            raise ValueError(
+                f'{where}: commands {speed!r} for the winch "{name}": must be a number of m/s'
+            )
+    return {name: float(speed) for name, speed in told.items()}
+
+
 class Sampler:
     """Samples a controller in one run.
 
@@ -413,7 +461,7 @@ class Sampler:
 
     def __init__(self, controller: Controller, scene: "Scene") -> None:
         self.controller = controller
-        self._places = {name: place for name, (place, _) in _places(scene).items()}
+        self._winches = places_of(scene)
         self.encoders = np.zeros((len(scene.structure.planes), scene.structure.sections))
         self._shown = np.full(self.encoders.shape, math.nan)
         self._next = 0
@@ -433,14 +481,14 @@ class Sampler:
         """
         own = self.controller
         while (now := self._next * own.period) <= time + AT_ONCE:
-            readings = self._readings(angles, chain)
-            told = own.step(now, readings)
+            told = own.step(now, self._readings(angles, chain))
             self._next += 1
-            if told:
-                self._sent.append((now + own.delay, self._checked(told, now)))
+            if told is not None:
+                where = f'controller.kind = "{kind_of(own)}" at {now:.6g} s'
+                self._sent.append((now + own.delay, checked(told, self._winches, where)))
         found: dict[Place, float] = {}
         while self._sent and self._sent[0][0] <= time + AT_ONCE:
-            found |= {self._places[name]: v for name, v in self._sent.pop(0)[1].items()}
+            found |= {self._winches[name][0]: v for name, v in self._sent.pop(0)[1].items()}
         return found
 
     def _readings(self, angles: Array, chain: Any) -> Readings:
@@ -458,23 +506,10 @@ class Sampler:
         noise = source.standard_normal(chain.winch_tensions.shape)
         tensions = _read(chain.winch_tensions, self.controller.load_cell, noise)
         told = (
-            {name: float(values[place]) for name, place in self._places.items()}
+            {name: float(values[place]) for name, (place, _) in self._winches.items()}
             for values in (tensions, chain.wound, chain.wound_rate)
         )
         return Readings(shown, *told)
-
-    def _checked(self, told: Mapping[str, float], time: float) -> dict[str, float]:
-        """Commands as plain numbers."""
-        where = f'controller.kind = "{kind_of(self.controller)}" at {time:.6g} s'
-        for name, speed in told.items():
-            if name not in self._places:
-                known = ", ".join(self._places) or "none"
-                raise ValueError(f'{where}: commands a winch "{name}" (there are: {known})')
-            if not math.isfinite(speed):
-                raise ValueError(
-                    f'{where}: commands {speed} m/s for the winch "{name}": must be a finite number'
-                )
-        return {name: float(speed) for name, speed in told.items()}
 
     def memory(self) -> dict[str, Any]:
         """What it remembers, as numbers, texts, arrays, lists and tables."""
@@ -488,6 +523,7 @@ class Sampler:
         """
         self._next = math.ceil((time - AT_ONCE) / self.controller.period)
         if memory is None or not same:
+            self.controller, self._sent = self.controller.begin(self.controller.scene), []
             return
         self._next, self._shown = memory["next"], memory["shown"][1]
         self._sent = [(at, dict(zip(*told, strict=True))) for at, *told in memory["sent"]]

@@ -379,6 +379,8 @@ class MotorWinding(FeedbackWinding):
         """See ``Winding``: the motor winds, and has no torque at its speed without a load."""
         free = self.voltage * self.no_load_speed
         shaft = min(max(speed / self.travel, _LEAST_COMMAND * free), (1.0 - _LEAST_COMMAND) * free)
+        if shaft == self.speed:
+            return self
         return self.model_copy(update={"speed": shaft, "ramp": None})
 
     def commanded_speed(self) -> float:

@@ -221,8 +221,9 @@ class Integration(Run):
         try:
             if control.goes_on and solver.InitializeSolver(system, self._settings):
                 solver.SolveSteps(system, self._settings)
-            if self._raised is not None:
-                raise self._raised
+            if (raised := self._raised) is not None:
+                self._raised = None  # its traceback holds this run
+                raise raised
         except exu.ExudynError as error:
             if "KeyboardInterrupt" in str(error):  # Ctrl-C within one of our own functions
                 raise KeyboardInterrupt from error

@@ -186,7 +186,8 @@ class Reading(Instant):
     planes: tuple[tuple[int, ...], ...] = ()
     """Planes of each cable of the chain: one may stand for two cables that pull alike."""
     commands: Array | None = None
-    """Speeds that motors are told, rad/s, shape (cables, 2); None without cables."""
+    """Speeds that winches are told, m/s, shape (cables, 2), NaN of those that take no commands;
+    None without cables."""
 
     def by_plane(self, of_cables: NDArray[Any]) -> Array:
         """A number for each plane, from one for each cable; NaN where a plane has no cable."""

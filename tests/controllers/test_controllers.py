@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import PrivateAttr, ValidationError
 from scipy.integrate import quad
 
 import ringsim
@@ -274,14 +274,25 @@ def test_engines_agree_on_a_controlled_run() -> None:
     assert np.ptp(rate.sel(plane="upper").values[-20:]) > 1e-4  # noise did move the winches
 
 
-def test_a_controlled_run_goes_on_from_a_state_bit_by_bit(tmp_path: Path) -> None:
-    """Between a sample and its command, which the state must remember."""
-    scene = ring().with_values({"record.state_interval": 0.85, "solver.end_time": 3.0})
+MOTOR = {
+    "kind": "motor", "no_load_speed": 600.0, "stall_torque": 0.05, "gear_ratio": 50.0,
+    "drum_radius": 0.02, "speed": 400.0, "rotor_inertia": 1e-6,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("delay", "winding"), [(0.25, None), (0.0, None), (0.0, MOTOR)], ids=str)
+def test_a_controlled_run_goes_on_from_a_state_bit_by_bit(
+    delay: float, winding: dict[str, Any] | None, tmp_path: Path
+) -> None:
+    """Also between a sample and its command, which the state must remember."""
+    scene = ring(delay=delay).with_values({"record.state_interval": 0.85, "solver.end_time": 2.0})
+    if winding:
+        scene = scene.with_values(both(winch={"winding": winding}))
     whole = ringsim.simulate(scene, fidelity="frame")
     whole.to_netcdf(tmp_path / "whole.nc")
     start = ringsim.read_state(tmp_path / "whole.nc", at=float(whole["state_time"][1]))
     rest = ringsim.simulate(scene, start=start)
-    names = ("opening_angle", "cable_tension", "wound_length", "energy_error")
+    names = ("opening_angle", "cable_tension", "wound_length", "energy_error", "winch_command")
     assert all(whole[name].equals(rest[name]) for name in names)
     other = scene.with_values({"controller.gain": 0.5})
     changed = ringsim.simulate(other, start=start)
@@ -318,6 +329,63 @@ def test_a_program_that_steps_a_run_is_a_controller(fidelity: str) -> None:
     assert all(run.result[name].equals(expected[name]) for name in names)
 
 
+def test_what_is_commanded_is_recorded_and_waits_for_the_start() -> None:
+    """A winch has from its start on what it was told before; nothing is cut to another sample."""
+    late = {"winding": FREE, "start_time": 0.7}
+    scene = load_scene("truss2").with_values(
+        both(winch=late) | {"solver.end_time": 1.5, "record.interval": 0.1}
+    )
+    run = ringsim.steps(scene, period=1.0)
+    for _ in run:
+        run.command(upper=0.02 + 0.01 * run.time)
+    told = run.result["winch_command"].sel(plane="upper").isel(winch=0)
+    assert told.values == pytest.approx([0.02] * 10 + [0.03] * 6)
+    assert run.result["winch_command"].sel(plane="lower").isel(winch=0).values == pytest.approx(0.0)
+    wound = run.result["wound_length"].sel(plane="upper")
+    assert wound.values[[7, 10, 15]] == pytest.approx([0.0, 0.006, 0.021], abs=1e-9)
+
+
+def test_a_program_is_told_at_once_what_it_cannot_command() -> None:
+    run = ringsim.steps(load_scene("truss2"), period=0.5)
+    for words, speeds in {
+        'commands a winch "uper"': {"uper": 0.1},
+        'of kind "constant" takes no commands': {"upper": 0.1},
+    }.items():
+        for _ in run:
+            with pytest.raises(InputError, match=words):
+                run.command(**speeds)
+            break
+
+
+def test_two_loops_over_one_run_do_not_meet() -> None:
+    run = ringsim.steps(load_scene("truss2").with_values({"solver.end_time": 1.0}), period=0.5)
+    first, second = iter(run), iter(run)
+    next(first)
+    next(second)
+    first.close()  # type: ignore[attr-defined]
+    assert len(list(second)) == 2
+
+
+class Private(Controller):
+    """Keeps a list of its own beside its state."""
+
+    kind: Literal["private-by-tests"] = "private-by-tests"
+    _own: list[float] = PrivateAttr(default_factory=list)
+
+    def step(self, time: float, readings: Any) -> dict[str, float]:
+        self._own.append(time)
+        return {"upper": 0.01 * len(self._own)}
+
+
+def test_nothing_goes_from_one_run_to_the_next() -> None:
+    scene = load_scene("truss2").with_values(
+        both(winch={"winding": FREE})
+        | {"controller": {"kind": "private-by-tests", "period": 0.25}, "solver.end_time": 1.0}
+    )
+    runs = [ringsim.simulate(scene, fidelity="frame") for _ in range(2)]
+    assert runs[0]["wound_length"].equals(runs[1]["wound_length"])
+
+
 def test_a_loop_that_is_left_ends_the_run() -> None:
     run = ringsim.steps(load_scene("truss2"), period=0.5)
     for readings in run:
@@ -344,26 +412,36 @@ class Broken(Controller):
             return {}
         if self.how == "raise":
             raise ZeroDivisionError("no such angle")
-        return {"uper": 0.1} if self.how == "name" else {"upper": float("nan")}
+        wrong = {"name": {"uper": 0.1}, "list": [0.1], "nan": {"upper": float("nan")}}
+        return wrong[self.how]  # type: ignore[return-value]
 
 
-@pytest.mark.parametrize("fidelity", ENGINES)
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ("raise", "ZeroDivisionError: no such angle"),
+        ("list", "at 0.4 s: gives [0.1]: must be speeds (m/s) by winch, or None"),
         ("name", 'at 0.4 s: commands a winch "uper" (there are: upper, lower)'),
-        ("nan", 'at 0.4 s: commands nan m/s for the winch "upper": must be a finite number'),
+        ("nan", 'at 0.4 s: commands nan for the winch "upper": must be a number of m/s'),
     ],
 )
-def test_a_controller_that_fails_is_a_status(how: str, words: str, fidelity: str) -> None:
+def test_a_command_that_is_none_is_a_status(how: str, words: str) -> None:
+    assert words in crashed(how, "frame")
+
+
+@pytest.mark.parametrize("fidelity", ENGINES)
+def test_a_controller_that_raises_is_a_status(fidelity: str) -> None:
+    assert "ZeroDivisionError: no such angle" in crashed("raise", fidelity)
+
+
+def crashed(how: str, fidelity: str) -> str:
+    """Why a run with a broken controller has ended."""
     scene = load_scene("truss2").with_values(
         both(winch={"winding": FREE})
         | {"controller": {"kind": "broken-by-tests", "period": 0.2, "how": how}}
     )
     run = ringsim.simulate(scene, fidelity=fidelity)
     assert run["status"].attrs["flag_meanings"].split()[int(run["status"])] == "crashed"
-    assert words in run.attrs["reason"]
+    return str(run.attrs["reason"])
 
 
 def test_what_cannot_be_is_refused() -> None:
@@ -376,6 +454,10 @@ def test_what_cannot_be_is_refused() -> None:
         ("ring18-cable", both(winch={"winding": FREE}) | {"cables.lower": "none",
          "controller": law}, "needs a cable in either plane"),
         ("ring18-flight", {"controller": law}, "leave its ramp out"),
+        ("ring18-motor", {"cables.upper.winch.winding.speed": None, "controller": law},
+         "give its speed"),
+        ("truss2", both(winch={"winding": FREE | {"speed": 0.5}}), "must lie between"),
+        ("truss2", both(winch={"winding": FREE | {"wound_before": 0.5}}), "written by runs"),
         ("truss2", {"faults": [{"kind": "failed-sensor", "section": 1, "time": 1.0}]},
          "no controller that reads one"),
     ]  # fmt: skip
@@ -385,7 +467,8 @@ def test_what_cannot_be_is_refused() -> None:
     scene = load_scene("truss2").with_values(
         {"controller": {"kind": "outside", "period": 0.5}, "solver.end_time": 1.0}
     )
-    assert "only ringsim.steps in Python" in ringsim.simulate(scene).attrs["reason"]
+    with pytest.raises(InputError, match=r"only ringsim\.steps in Python"):
+        ringsim.simulate(scene)
     with pytest.raises(InputError, match="give period"):
         ringsim.steps("truss2")
 
