@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from ringsim.measured import load_measured
     from ringsim.refusal import InputError
     from ringsim.scene import Scene, load_scene
-    from ringsim.simulation import simulate
+    from ringsim.simulation import simulate, steps
     from ringsim.stored_state import read_state
 
 __all__ = [
     "Calibration", "Campaign", "CampaignError", "InputError", "Optimisation", "Scene", "analyse",
-    "compare", "load_measured", "load_scene", "open_campaign", "read_state", "simulate",
+    "compare", "load_measured", "load_scene", "open_campaign", "read_state", "simulate", "steps",
 ]  # fmt: skip
 
 _HOMES = {
@@ -38,10 +38,12 @@ _HOMES = {
     "CampaignError": "campaign.python",
     "open_campaign": "campaign.python", "InputError": "refusal",
     "Optimisation": "campaign.optimisation", "load_measured": "measured", "Scene": "scene",
-    "load_scene": "scene", "simulate": "simulation", "read_state": "stored_state",
+    "load_scene": "scene", "simulate": "simulation", "steps": "simulation",
+    "read_state": "stored_state",
 }  # fmt: skip
 _OF_DATASETS = (
     "analyse", "compare", "Calibration", "Campaign", "Optimisation", "open_campaign", "simulate",
+    "steps",
 )  # fmt: skip
 """Words that give datasets, or take them."""
 

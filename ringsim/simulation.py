@@ -3,17 +3,20 @@
 Engines are imported by whoever runs them: each costs a second, and its own libraries.
 """
 
+import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ringsim.cable import friction
+from ringsim.cable.control import OUTSIDE, Outside, Readings, checked, places_of
 from ringsim.choice import kind_of
 from ringsim.outputs.balance import with_bars
 from ringsim.outputs.recorder import StoredState
@@ -31,7 +34,7 @@ from ringsim.variables import GONE, Cause, Fidelity, Outcome, Status
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIDELITIES", "run", "run_frame", "simulate", "why_not_frame"]
+__all__ = ["FIDELITIES", "Steps", "run", "run_frame", "simulate", "steps", "why_not_frame"]
 
 Watch = Callable[[Instant], None]
 """What is shown every accepted state of a run."""
@@ -142,6 +145,11 @@ def _run(
     """
     begin = (time.perf_counter(), time.process_time())
     scene = substituted(scene)
+    if isinstance(scene.controller, Outside) and not hasattr(OUTSIDE, "ask"):
+        raise InputError(
+            'controller.kind = "outside": only ringsim.steps in Python commands it: step the scene '
+            "there, or choose another kind"
+        )
 
     def start(variant: Scene) -> Outcome:
         """One start; times count from the first."""
@@ -253,3 +261,141 @@ def simulate(
         except InputError:  # the full model says what is wrong if that is not the frames' alone
             outcome = run(chosen)
     return to_dataset(outcome, chosen)
+
+
+# Runs that are stepped from outside.
+
+
+class _StoppedError(BaseException):
+    """Nobody asks for the next sample."""
+
+
+class Steps:
+    """A run that whoever iterates over it commands: one turn of the loop for each sample.
+
+    The run computes in a thread of its own and waits while the loop's body decides.  A loop that is
+    left early ends the run.
+
+    Attributes
+    ----------
+    time
+        Of the present sample, s.
+    """
+
+    def __init__(self, scene: Scene, fidelity: str) -> None:
+        self.time = 0.0
+        self._scene, self._fidelity, self._winches = scene, fidelity, places_of(scene)
+        self._told: dict[str, float] = {}
+        self._outcome: Outcome | None = None
+
+    def command(self, **speeds: float) -> None:
+        """Speeds (m/s) for winches by name, which they have from the sample's time and the
+        controller's ``delay`` on; ``command(**{"upper far": 0.1})`` for a second winch.  InputError
+        if there is no such winch, or it takes no commands.
+        """
+        try:
+            self._told |= checked(speeds, self._winches, "command")
+        except ValueError as error:
+            raise InputError(str(error)) from None
+
+    def __iter__(self) -> Iterator[Readings]:
+        self._outcome, self._told = None, {}
+        shown: SimpleQueue[tuple[float, Readings] | Outcome | BaseException] = SimpleQueue()
+        answers: SimpleQueue[Mapping[str, float] | None] = SimpleQueue()
+        left = threading.Event()
+
+        def ask(time: float, readings: Readings) -> Mapping[str, float]:
+            shown.put((time, readings))
+            if (answer := answers.get()) is None:
+                raise _StoppedError
+            return answer
+
+        def watch(now: Instant) -> None:
+            if left.is_set():
+                raise _StoppedError
+
+        def work() -> None:
+            OUTSIDE.ask = ask
+            try:
+                shown.put((run if self._fidelity == "full" else run_frame)(self._scene, watch))
+            except BaseException as error:  # for the thread that iterates
+                shown.put(error)
+
+        thread = threading.Thread(target=work, name="ringsim.steps", daemon=True)
+        thread.start()
+        try:
+            while True:
+                found = shown.get()
+                if isinstance(found, BaseException):
+                    raise found
+                if isinstance(found, Outcome):
+                    self._outcome = found
+                    return
+                self.time, readings = found
+                yield readings
+                told, self._told = self._told, {}
+                answers.put(told)
+        finally:
+            left.set()
+            answers.put(None)
+            thread.join()
+
+    @property
+    def result(self) -> "xr.Dataset":
+        """The dataset of the run, as of ``simulate``; RuntimeError before its end."""
+        from ringsim.dataset import to_dataset
+
+        if self._outcome is None:
+            raise RuntimeError("the run has not ended: iterate over all of its steps first")
+        return to_dataset(self._outcome, self._scene)
+
+
+def steps(
+    scene: Scene | str | Path, fidelity: str = "frame", *, period: float | None = None
+) -> Steps:  # fmt: skip
+    """A run to iterate over: each turn gives the readings of a sample, as controllers get them.
+
+    Parameters
+    ----------
+    scene
+        A scene, or what ``load_scene`` reads.  Winches of kind "commanded" or "motor" take
+        commands.  A ``controller`` of kind "outside" says how it is sampled: delay, errors of
+        sensors.
+    fidelity
+        "frame" or "full", see ``simulate``; either without restarts and error bars, for which the
+        loop would have to decide again.
+    period
+        Time between samples, s, in place of that of the scene's controller.
+
+    InputError if one of them is refused.
+
+    >>> winch = {"winding": {"kind": "commanded", "max_speed": 0.1}}
+    >>> scene = load_scene("truss2").with_values(
+    ...     {"cables.upper.winch": winch, "cables.lower.winch": winch, "solver.end_time": 2.0}
+    ... )
+    >>> run = steps(scene, period=0.5)
+    >>> for readings in run:
+    ...     run.command(upper=0.02, lower=0.02 if readings.tension["lower"] < 1.0 else 0.0)
+    >>> run.result["wound_length"].sel(plane="upper").values[-1].round(6)
+    0.04
+    """
+    chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene
+    if fidelity not in FIDELITIES:
+        raise InputError(
+            f"fidelity = {show(fidelity)}: there is no such model "
+            f"({known_or_nearest(fidelity, FIDELITIES)})"
+        )
+    outside = chosen.controller is not None and kind_of(chosen.controller) == "outside"
+    values: dict[str, Any] = {}
+    if not outside:
+        if chosen.controller is not None or period is None:
+            raise InputError(
+                'controller: must be of kind "outside" to be stepped: give it so, or leave it out '
+                "and give period (s)"
+            )
+        values["controller"] = {"kind": "outside", "period": period}
+    elif period is not None:
+        values["controller.period"] = period
+    # A start anew would ask again for what has been decided already.
+    values |= {"solver.restarts": 0, "solver.error_bars": False}
+    return Steps(chosen.with_values(values), fidelity)

@@ -232,6 +232,7 @@ class Winches:
             for number, cable in enumerate(cables)
             for end, winch in enumerate(cable.winches)
         }
+        self._given = dict(self._winches)
         self._start, self._held = 0.0, np.zeros((len(cables), 2))
         self._rates = np.zeros_like(self._held)
         self._slopes = np.zeros(len(cables))
@@ -327,6 +328,8 @@ class Winches:
         self._begun = {k: (path, natural) for k, path, natural in ropes}
         for number, end, table, ahead, turning in memory["winches"]:
             place = number, end
+            # As the scene has it: a controller has commanded the winch of this run already.
+            self._winches[place] = self._given[place]
             if self._winches[place] == before[number].winches[end]:
                 winch = self._winches[place] = Winch.model_validate(table)
                 if turning and isinstance(winch.winding, FeedbackWinding):
@@ -338,6 +341,36 @@ class Winches:
                 ahead = float(wound[place]) - by_law
             if ahead and not isinstance(self._winches[place].winding, FeedbackWinding):
                 self._ahead[place] = ahead
+
+    def command(self, time: float, speeds: Mapping[tuple[int, int], float]) -> bool:
+        """Let winches have the speeds (m/s) that a controller commands at a time (s), or have them
+        from their start on; returns whether any law has changed.
+        """
+        changed = False
+        for place, speed in speeds.items():
+            winch = self._winches[place]
+            early = time + AT_ONCE < winch.start_time
+            if early or winch.turns(time + AT_ONCE):
+                law = winch.winding.told(speed, max(time - winch.start_time, 0.0))
+                if law is not winch.winding:
+                    changed = True
+                    self._winches[place] = winch.model_copy(update={"winding": law})
+        return changed
+
+    def next_bend(self, time: float) -> float:
+        """Where a law bends next after a time (s), s; infinite if none does."""
+        bends = (bend for winch in self._winches.values() for bend in winch.breaks())
+        return min((bend for bend in bends if bend > time + AT_ONCE), default=math.inf)
+
+    def commands(self) -> Array:
+        """Speeds that winches are told by a controller, or could be, m/s, shape (cables, 2); NaN of
+        others.
+        """
+        found = np.full(self._held.shape, math.nan)
+        for place, winch in self._winches.items():
+            if winch.winding.commandable:
+                found[place] = winch.winding.commanded_speed()
+        return found
 
     def lock(self, number: int, time: float, state: ChainState) -> None:
         """The plane of a cable has locked at a time (s): its winches do what they do then."""

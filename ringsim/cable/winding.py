@@ -4,15 +4,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from ringsim.units import (
     Ampere,
-    AngularRate,
-    ControlGain,
     GearRatio,
     ListIn,
     Metre,
@@ -26,7 +24,6 @@ from ringsim.units import (
     SecondOrZero,
     SignedMetre,
     Speed,
-    SpeedOrZero,
     Tension,
     TorqueConstant,
     Unit,
@@ -59,6 +56,9 @@ class WinchReading:
 class Winding(Model):
     """Any winding law; time counts from the start of its winch."""
 
+    commandable: ClassVar[bool] = False
+    """Whether a controller can command its speed."""
+
     @property
     def motor(self) -> "MotorWinding | None":
         """The motor with its gears, of a law that has one."""
@@ -74,6 +74,12 @@ class Winding(Model):
     def breaks(self) -> tuple[float, ...]:
         """Times at which the law is not smooth, s: steps end there."""
         return ()
+
+    def told(self, speed: float, time: float) -> Self:
+        """The law from a time (s) on at which a controller commands a speed (m/s); itself if it
+        takes no commands.
+        """
+        return self
 
     def available_tension(self, *, at_speed: bool = False, losses: float = 1.0) -> float:
         """Tension against which the winch still winds, N, at its commanded speed or however slowly;
@@ -150,6 +156,9 @@ bound, and where the line has eleven times the torque at standstill no motor is 
 What pulls harder is braked."""
 
 
+_LEAST_COMMAND = 1e-6
+"""Share of the speed without a load that a command keeps from standstill and from that speed: the
+command of a motor must lie between them."""
 _FOLLOWS = 1e-9
 """Share of its command below which a rotor lags behind it: its speed is the command's number where
 it follows."""
@@ -180,6 +189,7 @@ class MotorWinding(FeedbackWinding):
     """
 
     kind: Literal["motor"] = "motor"
+    commandable: ClassVar[bool] = True
     no_load_speed: MotorSpeed
     """Of the motor's shaft at the rated voltage."""
     stall_torque: PositiveTorque
@@ -365,6 +375,14 @@ class MotorWinding(FeedbackWinding):
             torque = min(self.available(self.speed), self.derating * limited)
         return float(torque) / self.travel / (1.0 + losses * (1.0 / self.efficiency - 1.0))
 
+    def told(self, speed: float, time: float) -> Self:
+        """See ``Winding``: the motor winds, and has no torque at its speed without a load."""
+        free = self.voltage * self.no_load_speed
+        shaft = min(max(speed / self.travel, _LEAST_COMMAND * free), (1.0 - _LEAST_COMMAND) * free)
+        if shaft == self.speed:
+            return self
+        return self.model_copy(update={"speed": shaft, "ramp": None})
+
     def commanded_speed(self) -> float:
         """The command, in m/s; 0 without one."""
         return 0.0 if self.speed is None else self.travel * self.speed
@@ -547,49 +565,3 @@ class TableWinding(PrescribedWinding):
         """Its rate, in m/s; 0 outside the table."""
         inside = self.times[0] <= time < self.times[-1]
         return float(self._curve(time, 1)) if inside else 0.0
-
-
-# Winding that controls the tension of the rope, from measured bar angles.
-
-
-class TensionFeedbackWinding(FeedbackWinding):
-    """Wind as fast as the ideal geometry takes up rope, corrected by the tension's error.
-
-        speed = take-up + gain * (target - T),   cut to -max_payout .. max_speed
-
-    The measured angles give the path of the rope, hence its stretch and its tension, without
-    a force sensor.  The take-up is -dS/d(delta) * opening_rate, the speed that lets the sections
-    open at that rate: almost nothing at the stowed end, where a constant speed starts with a jerk.
-    Without an opening rate it is the measured -dS/dt: T then settles at the target within a time
-    of S / (EA * gain), whatever the structure does below max_speed.
-
-    Paper 000 proposes control on measured angles as further work; the law is this project's.
-    """
-
-    kind: Literal["tension-feedback"] = "tension-feedback"
-    target: Tension
-    """Tension wanted at the winch."""
-    gain: ControlGain = 0.02
-    """Added speed per newton of missing tension."""
-    max_speed: PositiveSpeed
-    """Fastest winding of the motor."""
-    max_payout: SpeedOrZero = 0.0
-    """Fastest paying out; 0: it never pays out."""
-    opening_rate: AngularRate | None = None
-    """Wanted rate of the opening angle; left out, the winch follows the structure."""
-
-    def usual_speed(self) -> float:
-        """The speed, in m/s, at which it takes up a slack rope while nothing else moves."""
-        return min(self.gain * self.target, self.max_speed)
-
-    def command(self, tension: float, reading: WinchReading) -> float:
-        """Speed wanted at a tension (N), in m/s."""
-        if self.opening_rate is None:
-            takeup = -reading.path_rate
-        else:
-            takeup = -reading.path_slope * self.opening_rate
-        return takeup + self.gain * (self.target - tension)
-
-    def limits(self) -> tuple[float, float]:
-        """From paying out to winding in."""
-        return -self.max_payout, self.max_speed

@@ -169,6 +169,7 @@ class Integration(Run):
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
+        self._raised: BaseException | None = None
         self.history = Recorder(scene, self._readings.coordinates())
         ropes = None if built.cables is None else built.cables.ropes.content
         self._set_out(
@@ -220,6 +221,9 @@ class Integration(Run):
         try:
             if control.goes_on and solver.InitializeSolver(system, self._settings):
                 solver.SolveSteps(system, self._settings)
+            if (raised := self._raised) is not None:
+                self._raised = None  # its traceback holds this run
+                raise raised
         except exu.ExudynError as error:
             if "KeyboardInterrupt" in str(error):  # Ctrl-C within one of our own functions
                 raise KeyboardInterrupt from error
@@ -228,19 +232,25 @@ class Integration(Run):
             if "USER FUNCTION" in str(error) and not self._refusal():
                 raise RuntimeError(" ".join(str(error).split())) from error
             cause = _detail(str(error))
+        finally:
+            self._let_go()
         if control.goes_on:
             control.fail(self._refusal() or cause)
         history: Recorder = self._conclude(self._energy.note())
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
-        # exudyn keeps the callbacks, and they keep the system that they were given to.  Such a
-        # circle through C++ is invisible to Python's garbage collector: unless it is cut, every
-        # run leaves its system behind (10 MB for a ring of 18 sections, 20 MB with cables).
-        solver.SetUserFunctionUpdateCurrentTime(system, lambda *_: None)
-        system.SetPostStepUserFunction(0)
-        system.SetPreNewtonResidualUserFunction(0)
-        system.SetPostNewtonUserFunction(0)
         return history
+
+    def _let_go(self) -> None:
+        """Take the callbacks from exudyn, which keeps them, and they keep the system that they were
+        given to.  Such a circle through C++ is invisible to Python's garbage collector: unless it
+        is cut, every run leaves its system behind (10 MB for a ring of 18 sections, 20 MB with
+        cables).
+        """
+        self._solver.SetUserFunctionUpdateCurrentTime(self._system, lambda *_: None)
+        self._system.SetPostStepUserFunction(0)
+        self._system.SetPreNewtonResidualUserFunction(0)
+        self._system.SetPostNewtonUserFunction(0)
 
     def _refusal(self) -> str:
         """What the cables could not answer, if that is why a step failed."""
@@ -250,7 +260,7 @@ class Integration(Run):
         """Set the step: the next one, or the reduced one of a retry."""
         control = self._control
         if self._fresh:
-            solver.it.currentStepSize = control.next_step(self._events.after(control.now.time))
+            solver.it.currentStepSize = control.next_step(self._next_event())
             self._fresh = False
             self._begin(control.now)
         else:
@@ -281,7 +291,11 @@ class Integration(Run):
             )
             self._control.diverge(Reason(Cause.NOT_FINITE, text))
             return False
-        return self._accepted(self._weighed or self._measured(time))
+        try:
+            return self._accepted(self._weighed or self._measured(time))
+        except BaseException as error:  # as of a controller: it is told as it is, see ``run``
+            self._raised = error
+            return False
 
     def _reading(self, now: Instant) -> Reading:
         """See ``Run``."""

@@ -8,8 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from ringsim.cable.chain import ChainState
-from ringsim.cable.faults import CableFault
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import CableFault, Ropes
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter, Readings
@@ -115,10 +114,6 @@ class Integration(Run):
                     break
                 step = control.retry(step)
         return cast(Recorder, self._conclude())
-
-    def _next_event(self) -> float:
-        """Time that no step may pass, s."""
-        return self._events.after(self._control.now.time)
 
     def _begin(self, now: Instant) -> None:
         """Let joints and winches begin a step."""
@@ -291,6 +286,8 @@ class Storing(Integration):
             memory["ropes"] = [ropes.starts, ropes.content, ropes.alive]
             memory["wound"] = [now.chain.wound, now.chain.wound_rate]
             memory["winches"] = cables.winches.memory()
+        if self._sampler is not None:
+            memory["sampler"] = self._sampler.memory()
         return memory
 
     def recall(self, memory: Memory) -> None:
@@ -308,6 +305,9 @@ class Storing(Integration):
         state = self._now
         go_on(self._control, self._scene.solver, memory["stepping"], changed, start.name)
         self.history.take_over(start.history, memory["recorder"], start.scenes, start.name)
+        if self._sampler is not None:
+            same = self._scene.controller == start.scene.controller
+            self._sampler.recall(memory.get("sampler"), start.time, same=same)
         gone = cleared(self._scene, start)
         self._strike_again(start, gone)
         if model.cables is not None:
@@ -337,6 +337,7 @@ class Storing(Integration):
         switches, planes = model.laws.switches, self._scene.structure.planes
         unknown = np.full(self._control.now.angles.shape, math.nan)
         own = Struck(planes, switches, unknown)
+        own.encoders = None if self._sampler is None else self._sampler.encoders
         for fault in struck_by(self._scene.faults, start.time):
             if not isinstance(fault, CableFault):
                 fault.strike(own)

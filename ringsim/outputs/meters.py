@@ -148,7 +148,8 @@ class Meters:
         """What outputs read of an instant in this state, with its ropes and the model's cables."""
         self.now = now
         planes = () if cables is None else tuple((plane,) for plane, _ in cables.present)
-        return Reading(**vars(now), meters=self, chain=chain, planes=planes)
+        told = None if cables is None else cables.winches.commands()
+        return Reading(**vars(now), meters=self, chain=chain, planes=planes, commands=told)
 
     @cached_property
     def _gauge(self) -> int | None:
@@ -184,6 +185,9 @@ class Reading(Instant):
     """All cables; None if the scene has none."""
     planes: tuple[tuple[int, ...], ...] = ()
     """Planes of each cable of the chain: one may stand for two cables that pull alike."""
+    commands: Array | None = None
+    """Speeds that winches are told, m/s, shape (cables, 2), NaN of those that take no commands;
+    None without cables."""
 
     def by_plane(self, of_cables: NDArray[Any]) -> Array:
         """A number for each plane, from one for each cable; NaN where a plane has no cable."""

@@ -89,12 +89,15 @@ class Motors(Output):
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
-        """Tension (N), speed (m/s) and rope wound (m) of every winch, (planes, 2, 3)."""
-        if now.chain is None:
+        """Tension (N), speed (m/s), rope wound (m) and command (m/s) of every winch, shape
+        (planes, 2, 4).
+        """
+        if now.chain is None or now.commands is None:
             return None
-        found = np.full((len(now.angles), 2, 3), np.nan)
+        found = np.full((len(now.angles), 2, 4), np.nan)
         chain = now.chain
-        own = np.stack([chain.winch_tensions, chain.wound_rate, chain.wound], axis=-1)
+        each = chain.winch_tensions, chain.wound_rate, chain.wound, now.commands
+        own = np.stack(each, axis=-1)
         for planes, value in zip(now.planes, own, strict=True):
             found[list(planes)] = value
         return found
@@ -108,7 +111,9 @@ class Motors(Output):
         current, supplied, lost = np.full((3, *torque.shape), np.nan)
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
-            tension, speed, wound = series.values[:, plane, end].T
+            tension, speed, wound, told = series.values[:, plane, end].T
+            if np.any(told != motor.commanded_speed()):  # by a controller
+                motor = motor.model_copy(update={"speed": told / motor.travel, "ramp": None})
             runs = np.array([winch.turns(time + AT_ONCE) for time in times], dtype=bool)
             if winch.after_lock == "stop":
                 runs &= times <= np.nan_to_num(held[plane].max(), nan=math.inf)
@@ -143,6 +148,34 @@ class Motors(Output):
                 values |= {peak.name: np.nanmax(own)} | peak.of(run, times, own)
         values["total_motor_energy"] = np.nansum(energy[-1])
         return values
+
+
+class Commands(Output):
+    """What a controller tells the winches."""
+
+    rank = 44
+    needs = ("controller",)
+    variables = (
+        Variable(
+            "winch_command", ("plane", "winch", "time"), "m/s",
+            "speed that a controller has commanded; NaN of winches that take no commands",
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array | None:
+        """For every plane and end."""
+        if now.commands is None:
+            return None
+        found = np.full((len(now.angles), 2), np.nan)
+        for planes, value in zip(now.planes, now.commands, strict=True):
+            found[list(planes)] = value
+        return found
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """As it stands at the output times."""
+        at = np.searchsorted(series.times, series.grid * (1.0 + 1e-12), side="right") - 1
+        shown = len(run.coordinates["winch"])
+        return {"winch_command": np.moveaxis(series.values[at, :, :shown], 0, -1)}
 
 
 def _electrical(series: Series, *courses: Array) -> Values:

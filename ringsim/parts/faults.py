@@ -26,7 +26,8 @@ class Struck:
     """What faults can change, between two steps of a run or on the way of a margin.
 
     ``folded`` are the angles by which V-joints are folded, shape (planes, sections), rad, NaN where
-    nobody knows; ``ropes`` the cables' (``ringsim.cable.ropes``) with the natural length ``stored``
+    nobody knows; ``encoders`` what each shows (``LAST``, ``SILENT``), None without a controller;
+    ``ropes`` the cables' (``ringsim.cable.ropes``) with the natural length ``stored``
     in each span, m, and the rope ``wound`` at both ends of each cable, m; None without cables.
     """
 
@@ -36,6 +37,7 @@ class Struck:
     ropes: Any = None
     stored: Any = None
     wound: Any = None
+    encoders: Any = None
 
 
 class Fault(Model):
@@ -151,6 +153,36 @@ class StuckVJoint(JointFault, AngleRecord):
     def reaction(self, folded: Any, rate: Any, setting: Any, xp: Any = np) -> Reaction:
         """See ``AngleRecord``; ``setting`` is the angle at which the joint is held."""
         return two_sided(folded - setting, rate, self.stiffness, self.damping)
+
+
+# A sensor that fails.
+
+
+LAST, SILENT = 1.0, 2.0
+"""What an encoder shows that has failed: its last reading, or nothing."""
+
+
+class FailedSensor(JointFault):
+    """The encoder of a V-joint fails: the controller is shown the same angle from then on, or
+    none.
+    """
+
+    kind: Literal["failed-sensor"] = "failed-sensor"
+    shows: Literal["last", "nothing"] = "last"
+    """What the controller is shown: the last reading, or that there is none."""
+
+    def strike(self, now: Struck) -> None:
+        """See ``Fault``."""
+        if now.encoders is not None:
+            now.encoders[self.place(now.planes)] = LAST if self.shows == "last" else SILENT
+
+    def check(self, scene: "Scene") -> None:
+        """See ``Fault``."""
+        if scene.controller is None:
+            raise ValueError(
+                "is a fault of a sensor, but the scene has no controller that reads one: add "
+                "[controller], or leave the fault out"
+            )
 
 
 # Striking them in the order of their times.

@@ -15,7 +15,7 @@ import annotated_types
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from ringsim.cable.faults import CableFault
+from ringsim.cable.ropes import CableFault
 from ringsim.refusal import models_in
 from ringsim.units import EACH, LEFT_OUT, Model, nested_in, unit_of
 

@@ -10,9 +10,9 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from ringsim.cable.faults import CableFault
 from ringsim.cable.friction import PulleyFriction
 from ringsim.cable.records import CABLES
+from ringsim.cable.ropes import CableFault
 from ringsim.choice import OneOf, kinds_of
 from ringsim.reference.keys import Key, keys_of, words_of
 from ringsim.reference.tree import ROOTS, facts

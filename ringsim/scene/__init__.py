@@ -13,8 +13,8 @@ from typing import Annotated, Any, ClassVar, Self, get_origin
 import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
-import ringsim.cable.faults  # noqa: F401  (kinds of faults)
 from ringsim import extensions
+from ringsim.cable.control import Controller
 from ringsim.cable.records import CABLES, Cable, Cables, numbered, path_of, spans_of
 from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
@@ -82,6 +82,8 @@ class Scene(Model):
     """Lines that carry corners in a ground test; left out, there are none."""
     cables: Cables | None = None
     """Driving cables with their winches; left out, there are none."""
+    controller: Annotated[Controller, OneOf()] | None = None
+    """What samples sensors and commands the winches; left out, these follow their own laws."""
     limits: Limits = Limits()
     """What counts as overloaded."""
     margin: Annotated[MarginStandard, OneOf()] | None = None

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from ringsim.cable.control import named_winches
 from ringsim.cable.winches import why_unlimited
 from ringsim.choice import kind_of
 from ringsim.layout.layout import Layout, layout_of
@@ -19,6 +20,14 @@ def check_parts(scene: "Scene") -> None:
     _check_limits(scene)
     _check_latch(scene)
     _check_margin(scene)
+    for name, winch in named_winches(scene).items():
+        if getattr(winch.winding, "told_before", False):
+            raise ValueError(
+                f"cables.{name.replace(' far', '.far_winch')}: begun, from_speed and wound_before "
+                "are written by runs: leave them out"
+            )
+    if scene.controller is not None:
+        scene.controller.check(scene)
 
 
 def _check_limits(scene: "Scene") -> None:

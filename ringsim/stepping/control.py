@@ -65,18 +65,20 @@ class RunControl(Remembering):
         follow_deviations: bool = False,
         turn: float = math.inf,
         strained: Strained = AS_DRAWN,
+        sampled: bool = False,
     ) -> None:
         """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop and
         their latches have caught, or one is past it by more than ``limits``, or all are at rest,
         else at ``solver.end_time``; with ``follow_deviations`` steps resolve how the joints deviate
         from their mean angle.  No stop that is reached before the time ``turn`` (s), at which loads
         turn round, ends it.  A structure that is not ``strained`` as it was put together does not
-        begin.
+        begin.  Steps of a run that is ``sampled`` by a controller are cut at every sample.
         """
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
         self._rest = Rest(start, solver.end_time, scales.energy)
         self._farthest = Overrun()
         self._scales, self._turn = scales, turn
+        self._sampled, self._cut = sampled, False
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
         self._deviations: DeviationSteps | None = None
@@ -138,13 +140,15 @@ class RunControl(Remembering):
         end = min(self._solver.end_time, self._settled_at)
         # What comes at once with the end is left to it: no step is as short as that.
         end = next_event if next_event < end - AT_ONCE else end
-        return self._steps.towards(end - self.now.time)
+        step = self._steps.towards(end - self.now.time)
+        self._cut = self._sampled and step < self._steps.step
+        return step
 
     def retry(self, shorter: float) -> float:
         """The step to repeat the last one with, s: what ``shorter`` has asked for, or else this."""
         self.repeats += 1
         self._steps.step = shorter if self._shorter is None else self._shorter
-        self._shorter = None
+        self._shorter, self._cut = None, False
         return self._steps.step
 
     def shorter(self, found: Instant) -> float | None:
@@ -168,7 +172,7 @@ class RunControl(Remembering):
         there.
         """
         for indicator in self._indicators:
-            indicator.accept(self.now, found)
+            indicator.accept(self.now, found, cut=self._cut)
         before, self.now = self.now, struck or found
         self._count += 1
         self._watch()

@@ -68,15 +68,18 @@ class Indicator(Remembering, ABC):
             return None
         return max(step * max(FALL, self.share(ratio)), self._least)
 
-    def accept(self, before: Instant, after: Instant) -> None:
-        """Learn from a step that is taken."""
+    def accept(self, before: Instant, after: Instant, *, cut: bool = False) -> None:
+        """Learn from a step that is taken; one that was ``cut`` at a sample of a controller ends
+        where little happens, and if it is good the limit stays.
+        """
         judged, ratio = self._judged
         step = after.time - before.time
         if after is not judged:
             ratio = self.ratio(before, after)
         # 1e-3 stands for 0: from 0.2 on down ``GROWTH`` bounds the step, whatever the ratio is.
         growth = min(max(self.share(max(ratio, 1e-3)), FALL), GROWTH)
-        self.limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf
+        limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf
+        self.limit = max(limit, self.limit) if cut and ratio <= 1.0 else limit
 
     def note(self) -> str:
         """What a run's reason must add about this; empty if every step was judged."""
@@ -122,9 +125,9 @@ class EnergyImbalance(Indicator):
         self._refused += found is not None
         return found
 
-    def accept(self, before: Instant, after: Instant) -> None:
+    def accept(self, before: Instant, after: Instant, *, cut: bool = False) -> None:
         """See ``Indicator``; adds to the energy exchanged."""
-        super().accept(before, after)
+        super().accept(before, after, cut=cut)
         if self._refused >= self._patience:
             self.limit = math.inf
         first, last = before.energies, after.energies
@@ -177,9 +180,9 @@ class TensionBend(Indicator):
         """Of second order."""
         return _SAFETY / math.sqrt(ratio)
 
-    def accept(self, before: Instant, after: Instant) -> None:
+    def accept(self, before: Instant, after: Instant, *, cut: bool = False) -> None:
         """See ``Indicator``; remembers the tensions."""
-        super().accept(before, after)
+        super().accept(before, after, cut=cut)
         if before.tensions is not None and after.tensions is not None:
             self._largest = max(self._largest, float(after.tensions.max()))
             self._past = after.time - before.time, before.tensions

@@ -77,6 +77,7 @@ class Run(Remembering):
     def __init__(self, scene: "Scene", watch: Any) -> None:
         self._scene, self._watch = scene, watch
         self._faults, self._events = Faults(scene.faults), Events(scene)
+        self._sampler = None if scene.controller is None else scene.controller.sampler(scene)
         self._turn = scene.loads_turn_at
         self._held = np.zeros(0, dtype=bool)
 
@@ -94,6 +95,7 @@ class Run(Remembering):
             follow_deviations=scene.record.stress,
             turn=scene.loads_turn_at,
             strained=strained,
+            sampled=self._sampler is not None,
         )
 
     # What an engine gives.
@@ -123,6 +125,15 @@ class Run(Remembering):
 
     # What happens.
 
+    def _next_event(self) -> float:
+        """Time that no step may pass, s."""
+        now = self._control.now.time
+        due = self._events.after(now)
+        if self._sampler is None:
+            return due
+        bend = math.inf if self._cables is None else self._cables.winches.next_bend(now)
+        return min(due, bend, self._sampler.next_time)
+
     def _begin(self, now: Instant) -> None:
         """Let winches begin a step."""
         cables, chain = self._cables, self._at
@@ -148,7 +159,8 @@ class Run(Remembering):
 
     def _read(self, now: Instant) -> Instant:
         """Note a state that the run goes on from; returns it as events leave it."""
-        if self._strike(now) | self._turn_loads(now.time) or self._events.at(now.time):
+        changed = self._strike(now) | self._turn_loads(now.time) | self._command(now)
+        if changed or self._events.at(now.time):
             self._energy.go_on_from(now.energies.work, self.state)
             self._begin(now)
             after = self._measured(now.time)
@@ -168,12 +180,20 @@ class Run(Remembering):
         hit = Struck(self._scene.structure.planes, self._laws.switches, np.pi - now.angles)
         if self._cables is not None and chain is not None:
             hit.ropes, hit.stored, hit.wound = self._cables.ropes, chain.stored, chain.wound
+        hit.encoders = None if self._sampler is None else self._sampler.encoders
         for fault in due:
             fault.strike(hit)
         self._laws.follow()
         if self._cables is not None:
             self._cables.take(hit.ropes)
         return True
+
+    def _command(self, now: Instant) -> bool:
+        """Let the controller sample; returns whether a winch has another law since."""
+        if self._sampler is None:
+            return False
+        speeds = self._sampler.due(now.time, now.angles, self._at)
+        return bool(speeds) and self._cables.winches.command(now.time, speeds)
 
     def _turn_loads(self, time: float) -> bool:
         """Turn the loads round if it is time (s); returns whether it was."""

@@ -10,7 +10,7 @@ from loops import for_each
 from pydantic import TypeAdapter, ValidationError
 
 from cable_cases import LAWS, random_case, still
-from ringsim.cable.faults import CableFault, CutCable, JammedPulley, OffSheave
+from ringsim.cable.ropes import CableFault, CutCable, JammedPulley, OffSheave
 from ringsim.choice import OneOf
 
 pytestmark = pytest.mark.quick

@@ -118,6 +118,7 @@ LAWS = {
         {"no_load_speed": 600.0, "stall_torque": 0.01, "gear_ratio": 100.0, "drum_radius": 0.01},
         0.03,
     ),
+    "commanded": ({"max_speed": 0.1, "speed": 0.03}, 0.03),
     "tension-feedback": ({"target": 0.5, "gain": 0.02, "max_speed": 0.3}, 0.01),
 }
 

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from scipy.integrate import quad, solve_ivp
 
 from cable_cases import LAWS, cable, random_case, still, wind
+from ringsim.cable.control import CommandedWinding, TensionFeedbackWinding
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winches import Winches
 from ringsim.cable.winding import (
@@ -21,7 +22,6 @@ from ringsim.cable.winding import (
     RampWinding,
     StallWinding,
     TableWinding,
-    TensionFeedbackWinding,
     Winding,
 )
 from ringsim.choice import kinds_of
@@ -33,6 +33,7 @@ LAWS_OF_TIME = {
     "ramp": RampWinding(speed=-0.2, duration=2.0),
     "ramp, cubic": RampWinding(speed=0.2, duration=2.0, shape="cubic"),
     "table": TableWinding(times=TIMES, lengths=LENGTHS),
+    "commanded": CommandedWinding(max_speed=0.3, acceleration=0.1, speed=0.2, from_speed=-0.1),
 }
 STALL = StallWinding(speed=0.1, max_tension=20.0)
 FEEDBACK = TensionFeedbackWinding(target=5.0, max_speed=0.3, max_payout=0.3)

@@ -20,12 +20,13 @@ from ringsim.cli import cli
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 
 MODULE = '''
-"""A bearing, an output and a distribution."""
+"""A bearing, a controller, an output and a distribution."""
 
 from typing import ClassVar, Literal
 
 import numpy as np
 
+from ringsim.cable.control import Controller
 from ringsim.cable.friction import Bearing
 from ringsim.outputs import Output
 from ringsim.sampling.distributions import Uniform
@@ -47,6 +48,21 @@ class {word}Friction(Bearing):
         faded = np.exp(-np.square(pulleys.speed / self.speed))
         lever = self.coefficients * (self.kinetic + (1.0 - self.kinetic) * faded)
         return -2.0 * np.arctanh(lever / radius * np.cos(0.5 * pulleys.angle))
+
+
+class {word}Controller(Controller):
+    """Adds the same speed in each of the first two steps."""
+
+    kind: Literal["{word}"] = "{word}"
+    speed: PositiveSpeed
+    """Added."""
+
+    def reset(self):
+        self.state["told"] = 0
+
+    def step(self, time, readings):
+        self.state["told"] = min(self.state["told"] + 1, 2)
+        return dict.fromkeys(readings.speed, self.state["told"] * self.speed)
 
 
 class {word}Angle(Output):
@@ -80,9 +96,13 @@ design = {{ kind = "random", samples = 4 }}
 "cables.upper.friction.kind" = "{word}"
 "cables.upper.friction.kinetic" = 1.0
 "cables.upper.friction.speed" = 1e-3
+"cables.upper.winch.winding" = {{ kind = "commanded", max_speed = 0.1 }}
+"cables.lower.winch.winding" = {{ kind = "commanded", max_speed = 0.1 }}
+controller = {{ kind = "{word}", period = 0.25, speed = 0.01, encoder.bias = 0.1 }}
 
 [inputs]
 "cables.upper.friction.coefficient" = {{ kind = "{word}-half", low = 1e-4, high = 9e-4 }}
+"controller.seed" = {{ kind = "uniform", low = 0.0, high = 1e6 }}
 
 [requirements]
 {word}_most = {{ max = 180.0, probability = 0.5, confidence = 0.5 }}
@@ -140,14 +160,19 @@ def test_own_kinds_run_everywhere(study: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(found[f"{WORD}_angle"], found["opening_angle"], rtol=1e-4)
     drawn = found["cables_upper_friction_coefficient"].values
     assert ((drawn > 1e-4) & (drawn < 5e-4)).all()
+    winch = {"winding": {"kind": "commanded", "max_speed": 0.1}}
     plain = load_scene("truss2").with_values(
-        {"solver.end_time": 1.0, "cables.upper.friction.coefficient": float(drawn[1])}
-    )
-    from ringsim import simulate
+        {"solver.end_time": 1.0, "cables.upper.friction.coefficient": float(drawn[1]),
+         "cables.upper.winch": winch, "cables.lower.winch": winch}
+    )  # fmt: skip
+    from ringsim import steps
 
-    expected = simulate(plain, fidelity="frame")
+    run = steps(plain, period=0.25)
+    for _ in run:
+        speed = 0.01 if run.time == 0.0 else 0.02
+        run.command(upper=speed, lower=speed)
     np.testing.assert_allclose(
-        found["opening_angle"].sel(sample=1), expected["opening_angle"], rtol=1e-7
+        found["opening_angle"].sel(sample=1), run.result["opening_angle"], rtol=1e-7
     )
 
     # Where a module lies decides about nothing, what it says about everything.

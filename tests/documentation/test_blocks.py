@@ -29,6 +29,7 @@ CALLS = [
 SCRIPTS = [
     ROOT / "README.md",
     ROOT / "docs" / "guide" / "commands.md",
+    ROOT / "docs" / "guide" / "controllers.md",
     ROOT / "docs" / "howto" / "own_structure.md",
     ROOT / "docs" / "howto" / "go_on.md",
 ]

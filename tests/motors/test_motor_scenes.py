@@ -161,6 +161,21 @@ def test_a_motor_winds_as_commanded_and_gives_nothing_while_it_is_off() -> None:
     assert np.ptp(found.motor_energy.sel(time=slice(0.45, None)).values) == 0.0
 
 
+def test_a_commanded_rotor_gives_what_its_present_command_asks_for() -> None:
+    """As of any rotor, whose command is not that of the scene; the brake takes nothing here."""
+    inertia, told = 1e-6, 100.0 * TRAVEL
+    rotor = MOTOR | {"speed": 300.0, "rotor_inertia": inertia}
+    values: dict[str, object] = {f"cables.{p}.winch.winding": rotor for p in ("upper", "lower")}
+    values["controller"] = {"kind": "synchronise", "period": 0.2, "speed": told, "gain": 0.0}
+    scene = ring(structure__sections=3, solver__end_time=0.6, solver__tolerance=3e-4)
+    found = simulate(scene.with_values(values), "frame")
+    last = found.isel(winch=0, time=-1)
+    assert last.motor_speed.values == pytest.approx(100.0, rel=1e-6)
+    kept = 0.5 * inertia * float((last.motor_speed**2).sum())
+    given, work = float(last.motor_energy.sum()), float(found.work[-1])
+    assert given == pytest.approx(work / 0.6 + kept, rel=0.02)
+
+
 @pytest.mark.parametrize("fidelity", ["frame", "full"])
 def test_rotors_keep_what_the_rope_does_not_get(fidelity: str) -> None:
     """Energy of the shafts = work of the winches over the gear's efficiency + J w^2 / 2."""
