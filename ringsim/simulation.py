@@ -376,7 +376,7 @@ def steps(
     >>> run = steps(scene, period=0.5)
     >>> for readings in run:
     ...     run.command(upper=0.02, lower=0.02 if readings.tension["lower"] < 1.0 else 0.0)
-    >>> run.result["wound_length"].sel(plane="upper").values[-1].round(6)
+    >>> round(float(run.result["wound_length"].sel(plane="upper")[-1]), 6)
     0.04
     """
     chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene

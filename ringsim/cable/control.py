@@ -50,7 +50,7 @@ class CommandedWinding(PrescribedWinding):
     once without one; the rope wound is its integral and ``wound_before``.
 
     >>> law = CommandedWinding(max_speed=0.2, acceleration=0.1).told(0.1, 2.0)
-    >>> law.wound(3.0), law.wound_rate(2.5), law.wound(4.0)
+    >>> law.wound(3.0), law.wound_rate(2.5), round(law.wound(4.0), 9)
     (0.05, 0.05, 0.15)
     """
 

@@ -29,7 +29,7 @@ from ringsim.parts.rods import AncfRods, GeometricallyExactRods, Rods
 from ringsim.parts.solver import Limits, Record, Solver
 from ringsim.parts.temperature import Temperature
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
-from ringsim.scene.checks import check_layout, check_parts
+from ringsim.scene.checks import check_controller, check_layout, check_parts
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
@@ -106,6 +106,7 @@ class Scene(Model):
                 )
         check_parts(self)
         self.structure.check(self)
+        check_controller(self)
         check_layout(self)
         for part in (self.spacecraft, self.offload, self.gravity, self.temperature):
             if part is not None:

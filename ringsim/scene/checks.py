@@ -20,6 +20,10 @@ def check_parts(scene: "Scene") -> None:
     _check_limits(scene)
     _check_latch(scene)
     _check_margin(scene)
+
+
+def check_controller(scene: "Scene") -> None:
+    """Refuse (ValueError) winches as only runs leave them, and a controller that has none."""
     for name, winch in named_winches(scene).items():
         if getattr(winch.winding, "told_before", False):
             raise ValueError(

@@ -212,7 +212,7 @@ def test_changed_distribution_is_told_with_its_input(tmp_path: Path) -> None:
         ("rods=ancf", 'rods = "ancf" must be a table: write [rods], and below it kind = "ancf"'),
         ("cables.upper.axial_stiffness=1e5", "cables.upper.winch is missing: give it a table"),
         ("cables.upper.winch.start_time=3", "cables.upper.winch.winding is missing: give it a "
-         "table with its kind, one of constant, motor, ramp,"),
+         "table with its kind, one of commanded, constant,"),
         ('faults={kind="stuck-vjoint",section=3}', "must be a list of tables: write [[faults]]"),
     ],
 )  # fmt: skip

@@ -56,7 +56,7 @@ def test_check_says_what_is_built() -> None:
     assert line(summary, "mobility").startswith("1 internal degree of freedom")
     assert (
         line(summary, "left out")
-        == "cables, gravity, latch, offload, spacecraft, joint friction, stress output"
+        == "cables, controller, gravity, latch, offload, spacecraft, joint friction, stress output"
     )
     assert summary.splitlines()[-1].startswith("valid")
 
