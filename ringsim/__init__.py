@@ -26,10 +26,12 @@ if TYPE_CHECKING:
     from ringsim.scene import Scene, load_scene
     from ringsim.simulation import simulate
     from ringsim.stored_state import read_state
+    from ringsim.vibration import modes
 
 __all__ = [
     "Calibration", "Campaign", "CampaignError", "InputError", "Optimisation", "Scene", "analyse",
-    "compare", "load_measured", "load_scene", "open_campaign", "read_state", "simulate",
+    "compare", "load_measured", "load_scene", "modes", "open_campaign", "read_state",
+    "simulate",
 ]  # fmt: skip
 
 _HOMES = {
@@ -39,9 +41,11 @@ _HOMES = {
     "open_campaign": "campaign.python", "InputError": "refusal",
     "Optimisation": "campaign.optimisation", "load_measured": "measured", "Scene": "scene",
     "load_scene": "scene", "simulate": "simulation", "read_state": "stored_state",
+    "modes": "vibration",
 }  # fmt: skip
 _OF_DATASETS = (
-    "analyse", "compare", "Calibration", "Campaign", "Optimisation", "open_campaign", "simulate",
+    "analyse", "compare", "Calibration", "Campaign", "Optimisation", "modes", "open_campaign",
+    "simulate",
 )  # fmt: skip
 """Words that give datasets, or take them."""
 
