@@ -59,6 +59,8 @@ _SPARE = 8
 """Vectors of the subspace beside those that are wanted."""
 _NUDGE = 1e-6
 """Largest way of a point (m) by which strains of a shape are measured."""
+_STILL = 1e12
+"""A step (s) in which nothing has inertia."""
 _HOLDS = 200.0
 """Stiffness (N m/rad) by which free V-joints are held while the rest finds its balance."""
 
@@ -153,7 +155,7 @@ class Standing:
             switches.on[-1][:] = 0.0
             model.laws.follow()
         self._factor()
-        self._mass = self._masses()
+        self.mass = self._masses()
 
     def _hold(self, stiffness: float, *, ramps: bool) -> None:
         """Hold V-joints where they are, in place of their stops; ramps of latches that are free."""
@@ -178,31 +180,32 @@ class Standing:
         """Of the step whose inertia is the shift, s."""
         return float(1.0 / np.sqrt(self._shift))
 
-    def _unbalance(self) -> Array:
+    def unbalance(self) -> Array:
         """Forces out of balance, N and N m."""
         given = self._still.table, self.state.table, self._strains
-        self.model.core("unbalance", 0.0, self._step, self.state, *given)
+        # A step so long that what has moved has no acceleration.
+        self.model.core("unbalance", 0.0, _STILL, self.state, *given)
         return self.model.system.g
 
     def _factor(self) -> None:
         """Factor K + s M, s as small as pivots allow."""
-        self._unbalance()
+        self.unbalance()
         while self.model.core("stiffen", 0.0, self._step, self.state, self.state.table,
                               self._strains):  # fmt: skip
             self._shift *= _MORE
             if self._shift > _LARGEST_SHIFT:
                 raise InputError(f"at {self.opening:g} deg a part moves that has no mass")
-            self._unbalance()
+            self.unbalance()
 
     def _settle(self) -> None:
         """Newton's method for the state in balance."""
         model = self.model
         for _ in range(_MOST):
-            norm = float(np.linalg.norm(self._unbalance() / model.lengths))
+            norm = float(np.linalg.norm(self.unbalance() / model.lengths))
             if norm <= model.tolerance(1.0, self._strains):
                 return
             self._factor()
-            change = -self._solve(self._unbalance()[:, None])[:, 0]
+            change = -self._solve(self.unbalance()[:, None])[:, 0]
             move(model.mesh, self.state.pose, change[: model.mesh.unknowns])
             if model.with_hub:
                 self.state.hub += change[-3:]
@@ -264,12 +267,12 @@ class Standing:
         InputError if the structure has fewer.
         """
         size = self.model.size
-        wanted, most = count + 7, size // 2
-        if count > (fewest := size // 8):
+        wanted, most = count + 7, size // 3
+        if count > (fewest := size // 4):
             raise InputError(f"{count} modes: this structure has {fewest} at most that mean "
                              "something: ask for fewer, or raise rods.elements")  # fmt: skip
         while True:
-            squares, shapes = self._lowest(min(wanted, most))
+            squares, shapes = self.lowest(min(wanted, most))
             zero = np.abs(squares) <= self._round_off(shapes)
             if (~zero).sum() >= count or wanted >= most:
                 break
@@ -287,14 +290,14 @@ class Standing:
         ways = (self.moving @ vectors).reshape(-1, 3, vectors.shape[1])
         return np.asarray(_ROUNDED * stiffest * np.sum(ways**2, axis=1).max(axis=0))
 
-    def _lowest(self, count: int) -> tuple[Array, Array]:
+    def lowest(self, count: int) -> tuple[Array, Array]:
         """So many w^2, in their order, and vectors with x^T M x = 1 in columns."""
         vectors = np.random.default_rng(0).standard_normal((self.model.size, count + _SPARE))
         before = np.full(count, np.inf)
         for _ in range(_MOST):
-            pushed = self._mass @ vectors
+            pushed = self.mass @ vectors
             found = self._solve(pushed)
-            stiff, heavy = found.T @ pushed, found.T @ (self._mass @ found)
+            stiff, heavy = found.T @ pushed, found.T @ (self.mass @ found)
             try:
                 inverse, turn = scipy.linalg.eigh(0.5 * (heavy + heavy.T), 0.5 * (stiff + stiff.T))
             except np.linalg.LinAlgError:  # it leaves its state faster than the shift holds it
@@ -302,7 +305,9 @@ class Standing:
                 self._factor()
                 continue
             order = np.argsort(-inverse)
-            vectors = found @ (turn[:, order] / np.sqrt(inverse[order]))
+            vectors = found @ (
+                turn[:, order] / np.sqrt(np.abs(inverse[order]))
+            )  # of the last, noise
             squares = 1.0 / inverse[order][:count] - self._shift
             floor = self._round_off(vectors[:, :count])
             if np.all(np.abs(squares - before) <= np.maximum(_ALIKE * np.abs(squares), floor)):
@@ -315,9 +320,9 @@ class Standing:
         whole = self.rigid_motions()
         if self.model.mesh.fixed.size or not free.size:
             return 0
-        gram = whole.T @ (self._mass @ whole)
+        gram = whole.T @ (self.mass @ whole)
         own = scipy.linalg.solve_triangular(
-            np.linalg.cholesky(gram), whole.T @ (self._mass @ free), lower=True
+            np.linalg.cholesky(gram), whole.T @ (self.mass @ free), lower=True
         )
         return int((np.linalg.svd(own, compute_uv=False) > 0.7).sum())
 
@@ -347,7 +352,7 @@ class Standing:
             shares.append([*stored, 0.5 * square - sum(stored)] / (0.5 * abs(square)))
         moved, places = np.array(shapes), readings.points()[:, 0]
         largest = np.linalg.norm(moved, axis=2).max(axis=1, initial=0.0)
-        along = self.rigid_motions()[:, :3].T @ (self._mass @ vectors)
+        along = self.rigid_motions()[:, :3].T @ (self.mass @ vectors)
         return Modes(
             rigid, mechanism, squares, points_of(model.layout, model.scene.structure.planes).names,
             places, moved / largest[:, None, None], 1.0 / largest**2, np.array(shares), along.T**2,
