@@ -305,9 +305,8 @@ class Standing:
                 self._factor()
                 continue
             order = np.argsort(-inverse)
-            vectors = found @ (
-                turn[:, order] / np.sqrt(np.abs(inverse[order]))
-            )  # of the last, noise
+            sizes = np.sqrt(np.abs(inverse[order]))  # the last may be noise
+            vectors = found @ (turn[:, order] / sizes)
             squares = 1.0 / inverse[order][:count] - self._shift
             floor = self._round_off(vectors[:, :count])
             if np.all(np.abs(squares - before) <= np.maximum(_ALIKE * np.abs(squares), floor)):
@@ -400,6 +399,12 @@ class Standing:
             own = turned[tuple(np.array(law.places).T)]
             found += float(0.5 * np.sum((ahead - behind) / (2.0 * _NUDGE) * own**2))
         return found
+
+
+def first_frequency(scene: Scene) -> float:
+    """Lowest natural frequency (Hz) of a ring that is open and latched, 0 if it is unstable."""
+    square = Standing(scene, 180.0, latched=True).modes(1).squares[0]
+    return float(np.sqrt(max(square, 0.0)) / (2.0 * np.pi))
 
 
 def with_still_winches(cables: Cables) -> Cables:

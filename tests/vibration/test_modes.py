@@ -89,7 +89,7 @@ def counts(scene: Any, at: list[Any], **given: Any) -> list[tuple[int, int]]:
 
 @pytest.mark.quick
 def test_an_unstable_state_is_told_and_not_hidden() -> None:
-    """The lever of a net's strings falls faster than they stretch: at 150 deg nothing leads back."""
+    """The lever of a net's strings falls faster than they stretch: nothing leads back."""
     netted = RING.with_values({"net.stiffness": 1.0, "net.neutral_length": 0.1})
     found = ringsim.modes(netted, [150.0], count=3)
     rate = float(found["growth_rate"][0, 0])
@@ -155,3 +155,34 @@ def test_the_same_call_gives_the_same_bits() -> None:
 def test_a_missing_scene_key_is_an_input_error() -> None:
     with pytest.raises(InputError, match="count = 0 must be from 1 to 100"):
         ringsim.modes(RING, [90.0], count=0)
+
+
+def test_a_run_records_the_first_frequency_of_what_it_has_deployed() -> None:
+    """Alike with both engines, and that of the verb; missing where the ring does not open; and
+    nothing at all where nobody asks.
+    """
+    asked = RING.with_values(
+        {"record.frequency": True, "structure.opening_angle": 170.0, "loads.force": 0.1}
+    )
+    known = float(ringsim.modes(asked, ["deployed"], count=1)["frequency"][0, 0])
+    for fidelity in ("frame", "full"):
+        run = ringsim.simulate(asked, fidelity)
+        assert float(run["first_frequency"]) == pytest.approx(known, rel=1e-9)
+        assert run["first_frequency"].attrs["units"] == "Hz"
+    short = ringsim.simulate(asked.with_values({"solver.end_time": 0.5}), "frame")
+    assert np.isnan(short["first_frequency"])
+    plain = asked.with_values({"record.frequency": False, "solver.end_time": 0.5})
+    assert "first_frequency" not in ringsim.simulate(plain, "frame")
+
+
+@for_each(
+    ("values", "told"),
+    [
+        ({"stop": "none"}, 'record.frequency = true: stop = "none" latches no V-joint'),
+        ({"rods.kind": "ancf"}, 'record.frequency = true: rods.kind = "ancf"'),
+    ],
+)
+def test_a_first_frequency_that_there_cannot_be_is_refused(values: Any, told: str) -> None:
+    with pytest.raises(InputError) as refused:
+        RING.with_values(values | {"record.frequency": True})
+    assert told in str(refused.value)
