@@ -51,6 +51,8 @@ about rods without inertia of their own are held by inertia alone."""
 _LARGEST_SHIFT = 1e12
 _ROUNDED = 2e3 * np.finfo(float).eps
 """w^2 that is round-off, over the stiffest spring over a shape's mass."""
+_UNSURE = 1e3
+"""Over that round-off, up to where strains tell whether something holds a shape."""
 _ALIKE, _MOST = 1e-10, 200
 """Relative change of w^2 at which the iteration ends, and its most rounds."""
 _TIGHT = 1e-6
@@ -273,30 +275,57 @@ class Standing:
                              "something: ask for fewer, or raise rods.elements")  # fmt: skip
         while True:
             squares, shapes = self.lowest(min(wanted, most))
-            zero = np.abs(squares) <= self._round_off(shapes)
+            floor = self._round_off(shapes)
+            if self._unstrained:  # else K alone knows, to its round-off
+                for k in np.flatnonzero(np.abs(squares) <= _UNSURE * floor):
+                    squares[k] = 2.0 * sum(self.stored(shapes[:, k]))
+            zero = np.abs(squares) <= floor
             if (~zero).sum() >= count or wanted >= most:
                 break
             wanted *= 2
-        rigid = self._rigid(shapes[:, zero])
-        chosen = np.flatnonzero(~zero)[:count]
-        return self._told(squares[chosen], shapes[:, chosen], rigid, int(zero.sum()) - rigid)
+        chosen, free = np.flatnonzero(~zero)[:count], int(zero.sum())
+        rigid = 0 if self._floats else self._rigid(shapes[:, zero])
+        told = (6, free) if self._floats else (rigid, free - rigid)
+        return self._told(squares[chosen], shapes[:, chosen], *told)
+
+    @property
+    def _unstrained(self) -> bool:
+        """Whether nothing pulls in this state, so that rods and joints store all energy."""
+        model = self.model
+        pulls = model.web.tape.rows[2]
+        return not (model.prestress or pulls.any() or model.cables or model.layout.hung) and (
+            model.layout.gravity is None
+        )
+
+    @property
+    def _floats(self) -> bool:
+        """Whether nothing outside of the structure holds it, or pulls at it."""
+        return not self.model.mesh.fixed.size and self.model.layout.gravity is None
 
     def _round_off(self, vectors: Array) -> Array:
-        """w^2 that means nothing, of vectors with x^T M x = 1 in columns, rad^2/s^2."""
-        model = self.model
+        """w^2 that means nothing, of vectors with x^T M x = 1 in columns, rad^2/s^2; small pivots,
+        which ask for a larger shift, leave more.
+        """
+        model, more = self.model, np.sqrt(self._shift / _SHIFT)
         stiffest = float(model.mesh.stiffness[:, 0].max())
         if model.skeleton.slides or model.bent is not None:
             stiffest *= STIFFNESS
         ways = (self.moving @ vectors).reshape(-1, 3, vectors.shape[1])
-        return np.asarray(_ROUNDED * stiffest * np.sum(ways**2, axis=1).max(axis=0))
+        return np.asarray(more * _ROUNDED * stiffest * np.sum(ways**2, axis=1).max(axis=0))
 
     def lowest(self, count: int) -> tuple[Array, Array]:
-        """So many w^2, in their order, and vectors with x^T M x = 1 in columns."""
+        """So many w^2, in their order, and vectors with x^T M x = 1 in columns; of what floats
+        freely those that are no rigid motions.
+        """
         vectors = np.random.default_rng(0).standard_normal((self.model.size, count + _SPARE))
-        before = np.full(count, np.inf)
+        before, rigid = np.full(count, np.inf), self.rigid_motions()
+        gram = rigid.T @ (self.mass @ rigid)
         for _ in range(_MOST):
             pushed = self.mass @ vectors
             found = self._solve(pushed)
+            if self._floats:  # rigid motions are known
+                found -= rigid @ np.linalg.solve(gram, rigid.T @ (self.mass @ found))
+                pushed -= self.mass @ (rigid @ np.linalg.solve(gram, rigid.T @ pushed))
             stiff, heavy = found.T @ pushed, found.T @ (self.mass @ found)
             try:
                 inverse, turn = scipy.linalg.eigh(0.5 * (heavy + heavy.T), 0.5 * (stiff + stiff.T))

@@ -86,16 +86,19 @@ def test_a_ring_on_soft_springs_is_an_oscillator_of_one_coordinate(angle: float)
 # Finite elements of another kind.
 
 
-@pytest.mark.parametrize(("angle", "latched"), [(60.0, False), (60.0, True), (180.0, True)])
+@pytest.mark.parametrize(
+    ("angle", "latched"),
+    [(60.0, False), pytest.param(60.0, True, marks=pytest.mark.slow), (180.0, True)],
+)
 def test_a_free_ring_of_rods_agrees_with_plain_finite_elements(angle: float, latched: bool) -> None:
-    """The limit of order two of 8 and 16 elements a half is theirs to 1e-5, where neither has the
-    inertia of rods about their own axes.  It counts by 6e-4 where bars twist about V-joints, and
-    the frames' 16 elements by 1.3e-3.
+    """The limit of order two of 8 and 16 elements a half is theirs to 5e-5, most of it theirs with
+    four, where neither has the inertia of rods about their own axes.  That counts by 6e-4 where
+    bars twist about V-joints, and the frames' 16 elements by 1.3e-3.
     """
     scene, free = ring(3, boom="none"), 6 if latched else 7
     stop = scene.stop
     assert stop is not None
-    layout = layout_of(scene.with_values({"rods.elements": 2}), 0.5 * np.radians(180.0 - angle))
+    layout = layout_of(scene, 0.5 * np.radians(180.0 - angle))
     found = []
     for elements in (8, 16):
         finer = scene.with_values({"rods.elements": elements})
@@ -103,7 +106,7 @@ def test_a_free_ring_of_rods_agrees_with_plain_finite_elements(angle: float, lat
         assert (modes.rigid, modes.mechanism) == (6, free - 6)
         found.append(hertz(modes.squares))
     limit = found[1] + (found[1] - found[0]) / 3.0
-    for twisting, bound in ((1e-3, 1e-5), (1.0, 1e-3)):
+    for twisting, bound in ((1e-3, 5e-5), (1.0, 1e-3)):
         held = stop.stiffness if latched else 0.0
         truth = hertz(squares(layout, scene.rods, 4, held, twisting))
         assert np.all(np.abs(truth[:free]) < 0.05)
