@@ -57,8 +57,10 @@ _ALIKE, _MOST = 1e-10, 200
 """Relative change of w^2 at which the iteration ends, and its most rounds."""
 _TIGHT = 1e-6
 """Share of a rope's tension to which it is met."""
+_SOFTEST = 1e-3
+"""Stiffness of a rope on its structure over that between walls, at least: steps stay bounded."""
 _SPARE = 8
-"""Vectors of the subspace beside those that are wanted."""
+"""Vectors of the subspace beside those that are wanted, and half as many as these."""
 _NUDGE = 1e-6
 """Largest way of a point (m) by which strains of a shape are measured."""
 _STILL = 1e12
@@ -135,7 +137,10 @@ class Standing:
             self.model = model = FrameModel(plain.model_copy(update=others))
         except InputError as error:
             why = str(error).removeprefix(f"{NOT_HERE} ").removesuffix(f": {CURE}")
-            raise InputError(f"modes are those of the frame engine, without {why}") from error
+            raise InputError(
+                f"modes are those of the frame engine, which does not represent {why}: leave that "
+                "out"
+            ) from error
         # Rates follow places by nothing, so that no damper and no friction counts; the hub of a net
         # is as light as runs can bear, and here has no mass at all.
         model.coefficients = Coefficients(0.0, 0.0, 1.0, 0.0)
@@ -157,6 +162,7 @@ class Standing:
             switches.on[-1][:] = 0.0
             model.laws.follow()
         self._factor()
+        self.moving = moving_points(model.mesh, self.state, model.size)
         self.mass = self._masses()
 
     def _hold(self, stiffness: float, *, ramps: bool) -> None:
@@ -196,7 +202,9 @@ class Standing:
                               self._strains):  # fmt: skip
             self._shift *= _MORE
             if self._shift > _LARGEST_SHIFT:
-                raise InputError(f"at {self.opening:g} deg a part moves that has no mass")
+                raise InputError(
+                    f"at {self.opening:g} deg a part moves that has no mass: give it one"
+                )
             self.unbalance()
 
     def _settle(self) -> None:
@@ -221,17 +229,24 @@ class Standing:
         content, last = cables.ropes.content, None
         for _ in range(_MOST):
             chain = cables.state(0.0, self.state.place.lines, self.state.rate.lines)
-            off = chain.mean_tensions - tension
+            # By the force before slack, which goes straight where the tension bends.
+            width = chain.material[2]
+            off = chain.forces - tension - width * np.log1p(-np.exp(-tension / width))
             if np.all(np.abs(off) <= _TIGHT * tension):
                 return
-            slope = -chain.material[0] / content
+            # A rope gives less than it would between walls, but not next to nothing.
+            most = chain.material[0] / content
+            slope = most
             if last is not None:
-                moved, by = content - last[0], off - last[1]
-                slope = np.where(np.abs(by) > 0.0, by / np.where(moved, moved, 1.0), slope)
-            last, content = (content, off), content - off / slope
+                by = (last[1] - off) / np.where(content == last[0], np.inf, content - last[0])
+                slope = np.clip(by, _SOFTEST * most, most)
+            last, content = (content, off), content + off / slope
             cables.take(replace(cables.ropes, content=content))
             self._settle()
-        raise InputError(f"at {self.opening:g} deg no length of the ropes has {tension:g} N")
+        raise InputError(
+            f"tension = {tension:g} N: at {self.opening:g} deg no length of the ropes has that: "
+            "lower it"
+        )
 
     def _solve(self, columns: Array) -> Array:
         """(K + s M)^-1 times columns, shape (unknowns, n)."""
@@ -245,7 +260,6 @@ class Standing:
     def _masses(self) -> "scipy.sparse.csr_array":
         """M, of all unknowns."""
         model, mesh = self.model, self.model.mesh
-        self.moving = moving_points(mesh, self.state, model.size)
         count, (one, other) = len(mesh.point_mass), mesh.point.T
         own, shared = mesh.mass.T
         masses = np.concatenate([mesh.point_mass, own, own, shared, shared])
@@ -271,8 +285,10 @@ class Standing:
         size = self.model.size
         wanted, most = count + 7, size // 3
         if count > (fewest := size // 4):
-            raise InputError(f"{count} modes: this structure has {fewest} at most that mean "
-                             "something: ask for fewer, or raise rods.elements")  # fmt: skip
+            raise InputError(
+                f"count = {count} must be at most {fewest}: the model of this structure has no "
+                "more that mean something (ask for fewer, or raise rods.elements)"
+            )
         while True:
             squares, shapes = self.lowest(min(wanted, most))
             floor = self._round_off(shapes)
@@ -317,7 +333,9 @@ class Standing:
         """So many w^2, in their order, and vectors with x^T M x = 1 in columns; of what floats
         freely those that are no rigid motions.
         """
-        vectors = np.random.default_rng(0).standard_normal((self.model.size, count + _SPARE))
+        vectors = np.random.default_rng(0).standard_normal(
+            (self.model.size, count + _SPARE + count // 2)
+        )
         before, rigid = np.full(count, np.inf), self.rigid_motions()
         gram = rigid.T @ (self.mass @ rigid)
         for _ in range(_MOST):
@@ -339,9 +357,12 @@ class Standing:
             squares = 1.0 / inverse[order][:count] - self._shift
             floor = self._round_off(vectors[:, :count])
             if np.all(np.abs(squares - before) <= np.maximum(_ALIKE * np.abs(squares), floor)):
-                break
+                return squares, vectors[:, :count]
             before = squares
-        return squares, vectors[:, :count]
+        raise InputError(
+            f"at {self.opening:g} deg the lowest frequencies are not found in {_MOST} rounds: ask "
+            "for more or fewer modes"
+        )
 
     def _rigid(self, free: Array) -> int:
         """How many of the motions that nothing holds, in columns, are rigid."""

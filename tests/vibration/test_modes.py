@@ -43,11 +43,14 @@ def test_angles_are_words_numbers_or_evenly_spread() -> None:
         (["--at", "90", "--points", "3"], "--points 3: --at says which angles"),
         (["--tension", "5"], "tension = 5 N: the scene has no cables"),
         (["--set", "stop=none", "--at", "deployed"], "give stop.stiffness, or choose --free"),
-        (["--set", "rods.kind=ancf", "--at", "90"], "without rods.kind = 'ancf'"),
+        (
+            ["--set", "rods.kind=ancf", "--at", "90"],
+            "does not represent rods.kind = 'ancf': leave that out",
+        ),
         (["--plot-format", "svg"], "has no effect without --plot"),
         (
             ["--modes", "90", "--set", "structure.sections=3"],
-            "ask for fewer, or raise rods.elements",
+            "count = 90 must be at most 3",
         ),
     ],
 )

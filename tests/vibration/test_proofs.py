@@ -161,6 +161,7 @@ def rayleigh(standing: Standing, vector: Any) -> float:
         ("ring18-ground", {}, 90.0, False, 0.0, 1e-5),
         ("ring18-cable", {}, 60.0, False, 5.0, 1e-5),
         ("ring18-motor", {}, 180.0, True, 5.0, 1e-5),
+        ("ring18-ground", {}, 180.0, True, 3.0, 1e-5),
         ("ring18", {"net.stiffness": 1.0, "boom.base": "fixed"}, 150.0, True, 0.0, 1e-5),
         ("ring18", {"boom.kind": "flexible", "boom.base": "fixed", "net": "none",
                     "gravity.vector": [1.0, 2.0, -9.81]}, 180.0, True, 0.0, 3e-4),
