@@ -31,10 +31,11 @@ from ringsim.scene.substituted import substituted
 #
 # J how points move with the unknowns and m their masses, those of rods between their ends among
 # them (ringsim.frame.mesh.inertia_of).  The core factors K + s M, which is the tangent of a step
-# whose inertia is s = 1 / (beta h^2), so that subspace iteration X <- (K + s M)^-1 M X finds the
-# lowest w^2, those of rigid motions (0) and unstable ones (negative) among them, without a second
-# assembly of K.  Source: K.-J. Bathe, Finite Element Procedures, 2nd ed., 2014, section 11.6; a
-# block finds modes of one frequency together, as rings have them.
+# whose inertia is s = 1 / (beta h^2), so that T = (K + s M)^-1 M is at hand without a second
+# assembly of K: its eigenvalues are 1 / (w^2 + s), the largest those of the lowest w^2, rigid ones
+# (0) and unstable ones (negative) among them.  They are found on X, T X, T^2 X, ..., orthonormal in
+# M, of a block X, which begins anew with what was found (block Lanczos method: Golub and Underwood,
+# in Mathematical Software III, 1977); a block finds modes of one frequency together, as rings have.
 
 
 PARTS = (
@@ -53,14 +54,20 @@ _ROUNDED = 2e3 * np.finfo(float).eps
 """w^2 that is round-off, over the stiffest spring over a shape's mass."""
 _UNSURE = 1e3
 """Over that round-off, up to where strains tell whether something holds a shape."""
-_ALIKE, _MOST = 1e-10, 200
-"""Relative change of w^2 at which the iteration ends, and its most rounds."""
+_ALIKE, _DEPTH, _MOST = 1e-9, 4, 100
+"""Relative change of w^2 at which the iteration ends, powers of T in a round, and most rounds."""
+_SAME = 1e-14
+"""Round-off of 1 / (w^2 + s) over the largest."""
+_NEGATIVE = 1e-9
+"""Share of the largest 1 / (w^2 + s) from which on one below zero is no round-off."""
+_PATIENCE = 500
+"""Iterations for a balance: slow ones where only inertia holds a part that is pulled."""
 _TIGHT = 1e-6
 """Share of a rope's tension to which it is met."""
 _SOFTEST = 1e-3
 """Stiffness of a rope on its structure over that between walls, at least: steps stay bounded."""
 _SPARE = 8
-"""Vectors of the subspace beside those that are wanted, and half as many as these."""
+"""Vectors of a block beside those that are wanted."""
 _NUDGE = 1e-6
 """Largest way of a point (m) by which strains of a shape are measured."""
 _STILL = 1e12
@@ -210,7 +217,7 @@ class Standing:
     def _settle(self) -> None:
         """Newton's method for the state in balance."""
         model = self.model
-        for _ in range(_MOST):
+        for _ in range(_PATIENCE):
             norm = float(np.linalg.norm(self.unbalance() / model.lengths))
             if norm <= model.tolerance(1.0, self._strains):
                 return
@@ -220,14 +227,15 @@ class Standing:
             if model.with_hub:
                 self.state.hub += change[-3:]
         raise InputError(
-            f"at {self.opening:g} deg nothing balances: {norm:.3g} N are left (gravity bends the "
-            "structure too far, or nothing carries it: stiffen or hold it, or leave gravity out)"
+            f"at {self.opening:g} deg nothing balances: {norm:.3g} N are left (gravity or the net "
+            "takes the structure too far, or nothing carries it: stiffen or hold it, or leave them "
+            "out)"
         )
 
     def _tighten(self, cables: FrameCables, tension: float) -> None:
         """Wind ropes until each has a tension, N: secants, as the structure gives."""
         content, last = cables.ropes.content, None
-        for _ in range(_MOST):
+        for _ in range(_PATIENCE):
             chain = cables.state(0.0, self.state.place.lines, self.state.rate.lines)
             # By the force before slack, which goes straight where the tension bends.
             width = chain.material[2]
@@ -333,36 +341,45 @@ class Standing:
         """So many w^2, in their order, and vectors with x^T M x = 1 in columns; of what floats
         freely those that are no rigid motions.
         """
-        vectors = np.random.default_rng(0).standard_normal(
-            (self.model.size, count + _SPARE + count // 2)
-        )
-        before, rigid = np.full(count, np.inf), self.rigid_motions()
-        gram = rigid.T @ (self.mass @ rigid)
+        rigid = self._orthonormal(self.rigid_motions()[:, : 6 * self._floats], [])
+        size = self.model.size, count + _SPARE
+        before, vectors = np.full(count, np.inf), np.random.default_rng(0).standard_normal(size)
         for _ in range(_MOST):
-            pushed = self.mass @ vectors
-            found = self._solve(pushed)
-            if self._floats:  # rigid motions are known
-                found -= rigid @ np.linalg.solve(gram, rigid.T @ (self.mass @ found))
-                pushed -= self.mass @ (rigid @ np.linalg.solve(gram, rigid.T @ pushed))
-            stiff, heavy = found.T @ pushed, found.T @ (self.mass @ found)
-            try:
-                inverse, turn = scipy.linalg.eigh(0.5 * (heavy + heavy.T), 0.5 * (stiff + stiff.T))
-            except np.linalg.LinAlgError:  # it leaves its state faster than the shift holds it
+            basis, images = [self._orthonormal(vectors, [rigid])], list[Array]()
+            while len(images) < _DEPTH and basis[-1].size:
+                images.append(self._solve(self.mass @ basis[-1]))
+                basis.append(self._orthonormal(images[-1], [rigid, *basis]))
+            found = np.hstack(images)
+            small = np.hstack(basis[: len(images)]).T @ (self.mass @ found)
+            inverse, turn = np.linalg.eigh(0.5 * (small + small.T))
+            if inverse[0] < -_NEGATIVE * inverse[-1]:  # it leaves its state faster than s holds it
                 self._shift *= _MORE
                 self._factor()
                 continue
-            order = np.argsort(-inverse)
-            sizes = np.sqrt(np.abs(inverse[order]))  # the last may be noise
-            vectors = found @ (turn[:, order] / sizes)
-            squares = 1.0 / inverse[order][:count] - self._shift
-            floor = self._round_off(vectors[:, :count])
-            if np.all(np.abs(squares - before) <= np.maximum(_ALIKE * np.abs(squares), floor)):
+            inverse, turn = inverse[: -size[1] - 1 : -1], turn[:, : -size[1] - 1 : -1]
+            # Once more through the inverse, which leaves nothing of what has no mass.
+            vectors = found @ (turn / inverse)
+            squares = 1.0 / inverse[:count] - self._shift
+            floor = np.maximum(self._round_off(vectors[:, :count]), _ALIKE * np.abs(squares))
+            floor += _SAME * inverse[0] / inverse[:count] ** 2
+            if np.all(np.abs(squares - before) <= floor):
                 return squares, vectors[:, :count]
             before = squares
         raise InputError(
             f"at {self.opening:g} deg the lowest frequencies are not found in {_MOST} rounds: ask "
             "for more or fewer modes"
         )
+
+    def _orthonormal(self, columns: Array, others: Sequence[Array]) -> Array:
+        """A basis of what columns have beside others, both with x^T M x = 1."""
+        whole = np.sum(columns * (self.mass @ columns), axis=0)
+        for _ in range(2):  # the second time for what round-off has left
+            for other in others:
+                columns = columns - other @ (other.T @ (self.mass @ columns))
+        columns = columns / np.sqrt(np.maximum(whole, np.finfo(float).tiny))
+        sizes, turn = np.linalg.eigh(columns.T @ (self.mass @ columns))
+        kept = sizes > _ALIKE
+        return np.asarray(columns @ (turn[:, kept] / np.sqrt(sizes[kept])))
 
     def _rigid(self, free: Array) -> int:
         """How many of the motions that nothing holds, in columns, are rigid."""
