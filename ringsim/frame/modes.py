@@ -1,5 +1,6 @@
 """Natural frequencies and shapes of a structure that stands still, from its tangent and masses."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -22,7 +23,7 @@ from ringsim.layout.points import points_of
 from ringsim.parts.laws import AngleLaw, AngleRecord, Reaction, two_sided
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.scene.substituted import substituted
+from ringsim.scene.substituted import strained, substituted
 
 # With small changes x of the unknowns about a state in balance, the tangent K of its forces and the
 # masses M of its points,
@@ -72,6 +73,8 @@ _NUDGE = 1e-6
 """Largest way of a point (m) by which strains of a shape are measured."""
 _STILL = 1e12
 """A step (s) in which nothing has inertia."""
+_STRAINED_LAST = 178.0
+"""Opening angle (deg) beyond which strained rods are led there by what holds the V-joints."""
 _HOLDS = 200.0
 """Stiffness (N m/rad) by which free V-joints are held while the rest finds its balance."""
 
@@ -136,7 +139,9 @@ class Standing:
         )
         if tension > 0.0 and cables is None:
             raise InputError(f"tension = {tension:g} N: the scene has no cables: leave it out")
-        at = {"opening_angle": opening, "angle_error": None}
+        # Strained rods cannot be put together where the mean angle hardly moves them.
+        start = min(opening, _STRAINED_LAST) if strained(plain) else opening
+        at = {"opening_angle": start, "angle_error": None}
         known = at.keys() & type(plain.structure).model_fields
         structure = plain.structure.model_copy(update={name: at[name] for name in known})
         others = {"loads": None, "cables": cables, "faults": (), "structure": structure}
@@ -148,6 +153,8 @@ class Standing:
                 f"modes are those of the frame engine, which does not represent {why}: leave that "
                 "out"
             ) from error
+        except ValueError as error:
+            raise InputError(f"at {opening:g} deg: {error}") from error
         # Rates follow places by nothing, so that no damper and no friction counts; the hub of a net
         # is as light as runs can bear, and here has no mass at all.
         model.coefficients = Coefficients(0.0, 0.0, 1.0, 0.0)
@@ -159,7 +166,7 @@ class Standing:
         empty = np.zeros_like(self.state.strains)
         self._strains = Strains(self.state.strains, empty, 0.0)
         stiffness = _HOLDS if scene.stop is None else scene.stop.stiffness
-        self._hold(stiffness, ramps=not latched)
+        self._hold(stiffness, math.radians(opening - start), ramps=not latched)
         self._shift = _SHIFT
         self._settle()
         if model.cables is not None:
@@ -172,12 +179,16 @@ class Standing:
         self.moving = moving_points(model.mesh, self.state, model.size)
         self.mass = self._masses()
 
-    def _hold(self, stiffness: float, *, ramps: bool) -> None:
-        """Hold V-joints where they are, in place of their stops; ramps of latches that are free."""
+    def _hold(self, stiffness: float, further: float, *, ramps: bool) -> None:
+        """Hold V-joints so much further open than they are (rad), in place of their stops; ramps of
+        latches that are free.
+        """
         model, layout = self.model, self.model.skeleton.layout
         folded = np.pi - model.openings.read(self.state.pose.angle, self.state.rate.angles)[0]
         kept = [law for law in layout.angle_laws if law.group == "springs"]
         kept += [law for law in layout.angle_laws if law.group == "latches" and ramps]
+        # Fully open, stops and latches take all to one angle, whatever rods would have.
+        folded = folded - further if self.opening < 180.0 else np.zeros_like(folded)
         places = tuple(np.ndindex(*folded.shape))
         hold = AngleLaw(
             "held", Holding(stiffness=stiffness), places, np.ones(len(places)), folded.ravel()

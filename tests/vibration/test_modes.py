@@ -113,6 +113,21 @@ def test_ropes_that_winches_hold_are_springs_and_slack_ones_nothing() -> None:
     assert float(taut["frequency"][0, 0]) > 0.9 * float(slack["frequency"][0, 0])
 
 
+@pytest.mark.parametrize("values", [
+    {"rods.length_error.diagonal_rising": [1e-4, 0.0, -2e-4, 0.0]},
+    {"structure.hinge_error.upper_left": 2e-5},
+    {"structure.angle_error": [0.5, 0.0, -0.5, 0.0]},
+])  # fmt: skip
+def test_rods_that_are_not_as_drawn_change_next_to_nothing(values: dict[str, Any]) -> None:
+    """Also where they are fully open, and no state of strained rods is near the drawing."""
+    drawn, made = (
+        ringsim.modes(scene, [90.0, "deployed"], count=3)["frequency"].values
+        for scene in (ALONE, ALONE.with_values(values))
+    )
+    assert made == pytest.approx(drawn, rel=2e-3)
+    assert np.any(made != drawn) or "structure.angle_error" in values
+
+
 def test_gravity_is_that_of_the_scene() -> None:
     """A ring on a clamped boom hangs or stands: its weight stiffens or softens it."""
     held = ALONE.with_values({"boom.base": "fixed"})
