@@ -26,10 +26,12 @@ if TYPE_CHECKING:
     from ringsim.scene import Scene, load_scene
     from ringsim.simulation import simulate, steps
     from ringsim.stored_state import read_state
+    from ringsim.vibration import modes
 
 __all__ = [
     "Calibration", "Campaign", "CampaignError", "InputError", "Optimisation", "Scene", "analyse",
-    "compare", "load_measured", "load_scene", "open_campaign", "read_state", "simulate", "steps",
+    "compare", "load_measured", "load_scene", "modes", "open_campaign", "read_state", "simulate",
+    "steps",
 ]  # fmt: skip
 
 _HOMES = {
@@ -39,11 +41,11 @@ _HOMES = {
     "open_campaign": "campaign.python", "InputError": "refusal",
     "Optimisation": "campaign.optimisation", "load_measured": "measured", "Scene": "scene",
     "load_scene": "scene", "simulate": "simulation", "steps": "simulation",
-    "read_state": "stored_state",
+    "read_state": "stored_state", "modes": "vibration",
 }  # fmt: skip
 _OF_DATASETS = (
-    "analyse", "compare", "Calibration", "Campaign", "Optimisation", "open_campaign", "simulate",
-    "steps",
+    "analyse", "compare", "Calibration", "Campaign", "Optimisation", "modes", "open_campaign",
+    "simulate", "steps",
 )  # fmt: skip
 """Words that give datasets, or take them."""
 

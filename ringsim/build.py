@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent
 AROUND = (
     "__main__.py", "accessor.py", "analysis", "campaign", "cli", "execution",
     "export.py", "measured.py", "plots", "reference", "report", "sampling", "storage",
-    "stowed_angle.py",
+    "stowed_angle.py", "vibration.py",
 )  # fmt: skip
 """What plans and reads results and never makes them: no part of the sources' digest, so that a
 campaign goes on after a figure was mended.  All else counts, also what comes new."""

@@ -29,7 +29,7 @@ from ringsim.stepping.ending import run_with_restarts
 from ringsim.stepping.instant import Instant
 from ringsim.stored_state import require_fit
 from ringsim.threads import one_thread
-from ringsim.variables import GONE, Cause, Fidelity, Outcome, Status
+from ringsim.variables import GONE, Cause, Fate, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -174,6 +174,10 @@ def _run(
         lambda outcome, used: with_bars(outcome, so_solved(used), start),
     )
     outcome.values["fidelity"] = np.array(int(fidelity))
+    if scene.record.frequency and outcome.fate is Fate.DEPLOYED:
+        from ringsim.frame.modes import first_frequency  # few scenes ask for it
+
+        outcome.values["first_frequency"] = np.array(first_frequency(scene))
     return _with_remark(with_margin(outcome, scene, before), scene)
 
 

@@ -35,6 +35,7 @@ VERBS = {
     "calibrate": "Find unknown inputs from measured data.",
     "sensors": "Tell before a test how much each sensor would tell.",
     "optimise": "Find the values that make an antenna best under what is uncertain.",
+    "modes": "Natural frequencies and shapes of a ring along its opening.",
     "stability": "Map which settings the solver can run, and how other runs end.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",
 }
@@ -42,7 +43,7 @@ VERBS = {
 _FILES = {
     "scene": ("scenes", "check", "explain"),
     "run": ("run",),
-    "studies": ("accuracy", "stability", "calibrate", "sensors", "optimise"),
+    "studies": ("modes", "accuracy", "stability", "calibrate", "sensors", "optimise"),
     "campaign": ("campaign", "status", "replay"),
     "results": ("merge", "analyse", "report", "plot", "compare", "export"),
 }

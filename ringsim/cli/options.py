@@ -105,12 +105,15 @@ def write_animation(run: "xr.Dataset", file: Path, colour: str | None) -> None:
 
 
 def draw_result(dataset: "xr.Dataset", folder: Path, stem: str, formats: Formats = None) -> None:
-    """Write the figure of a posterior or of a front, as their verbs and plot do."""
+    """Write the figure of a posterior, of a front or of modes, as their verbs and plot do."""
     from ringsim.plots import figures
     from ringsim.plots.comparison import learnt
+    from ringsim.plots.ring import modes
     from ringsim.plots.studies import front
 
     name, draw = ("learnt", learnt) if "learnt" in dataset else ("front", front)
+    if "mechanism_modes" in dataset:
+        name, draw = "modes", modes
     for written in figures.write_figure(
         draw(dataset), folder, f"{stem}-fig-{name}", formats or ("png",)
     ):

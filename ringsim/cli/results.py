@@ -245,14 +245,16 @@ def plot_command(
 ) -> None:  # fmt: skip
     """Draw the figures of a run, or of a campaign, from its FILE.
 
-    FILE is what ringsim run, replay --save, campaign, merge, calibrate or optimise has written.
+    FILE is what ringsim run, replay --save, campaign, merge, modes, calibrate or optimise has
+    written.
     """
     require_with("--colour", colour, "--animate", animate)
     require_with("--sample", sample, "--animate", animate)
     from ringsim.plots.figures import left_out
 
     with opened(file) as dataset:
-        if {"learnt", "posterior_quantile"} <= set(dataset) or "tried_objective" in dataset:
+        others = {"tried_objective", "mechanism_modes"} & set(dataset)
+        if others or {"learnt", "posterior_quantile"} <= set(dataset):
             draw_result(dataset, out or file.parent, file.stem, formats)
             return
         file = file / MERGED if file.is_dir() else file

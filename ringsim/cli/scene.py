@@ -78,7 +78,7 @@ def _write_with_schema(text: str, out: Path) -> None:
 
     A name without a folder: both files may be moved, and nothing is looked up elsewhere.
     """
-    from ringsim.reference.schema import schema_of  # reads every record of the package
+    from ringsim.reference.tree import schema_of  # reads every record of the package
 
     require_place(out)
     schema = out.with_name(SCHEMA)
@@ -523,7 +523,7 @@ def _key(name: str, variables: dict[str, Variable]) -> str:
 
 
 def _print_schema(kind: str, names: tuple[str, ...]) -> None:
-    from ringsim.reference.schema import schema_of
+    from ringsim.reference.tree import schema_of
 
     if names:
         raise InputError(

@@ -1,4 +1,4 @@
-"""``ringsim accuracy``, ``stability``, ``calibrate``, ``sensors`` and ``optimise``."""
+"""``ringsim modes``, ``accuracy``, ``stability``, ``calibrate``, ``sensors`` and ``optimise``."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -10,16 +10,86 @@ import tomli_w
 
 from ringsim.campaign.run import Ended
 from ringsim.campaign.studies import Panel, by_engines, panels_over
-from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS, draw_result
+from ringsim.cli.options import (
+    PATH,
+    PLOT_FORMAT,
+    SCENE,
+    SETTINGS,
+    WORKERS,
+    Formats,
+    draw_result,
+    require_with,
+)
 from ringsim.execution.mpi import launched_size
-from ringsim.files import read_text, write_text
-from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED
+from ringsim.files import read_text, require_file, write_text
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, InputError
 from ringsim.scene import load_scene
 from ringsim.tables import Table, counted
 
 _WORKERS = click.option(
     "--workers", metavar="N", type=WORKERS, help="Solver processes (default: all cores)."
 )
+
+
+@click.command()
+@SCENE
+@SETTINGS
+@click.option(
+    "--at", metavar="ANGLES",
+    help="Opening angles, deg, e.g. 10,40,90 or stowed,deployed (default: see --points).",
+)  # fmt: skip
+@click.option(
+    "--points", metavar="N", type=click.IntRange(2, 200),
+    help="So many angles, evenly from stowed to deployed (default 9).",
+)  # fmt: skip
+@click.option(
+    "--modes", "count", metavar="N", type=click.IntRange(1, 100), default=6, show_default=True,
+    help="Modes at each angle, beside motions that nothing holds.",
+)  # fmt: skip
+@click.option(
+    "--latched/--free", "latched", default=None,
+    help=
+        "Hold V-joints at every angle by the stiffness of their stop, or let them turn (default: "
+        "held where the ring is fully open).",
+)  # fmt: skip
+@click.option(
+    "--tension", metavar="N", type=click.FloatRange(0.0, 1e6), default=0.0, show_default=True,
+    help="Tension of the ropes, whose winches hold; 0: they are slack.",
+)  # fmt: skip
+@click.option("--out", metavar="FILE", type=PATH, help="netCDF file (default SCENE-modes.nc).")
+@click.option("--plot", is_flag=True, help="Draw frequencies and shapes beside the netCDF file.")
+@PLOT_FORMAT
+def modes_command(
+    scene: str, settings: dict[str, Any], at: str | None, points: int | None, count: int,
+    latched: bool | None, tension: float, out: Path | None, *, plot: bool, formats: Formats,
+) -> int:  # fmt: skip
+    """Natural frequencies and shapes of SCENE, at rest at opening angles from stowed to deployed.
+
+    Free V-joints leave the mechanism free, latched ones are as stiff as the scene's stop; gravity,
+    the net and the base are the scene's.  Writes SCENE-modes.nc.
+    """
+    require_with("--plot-format", formats, "--plot", plot)
+    if at is not None and points is not None:
+        raise InputError(f"--points {points}: --at says which angles: leave out one of the two")
+    chosen = load_scene(scene).with_values(settings)
+    target = out or Path(f"{chosen.name}-modes.nc")
+    require_file(target)
+
+    from ringsim.dataset import save
+    from ringsim.vibration import modes, modes_tables
+
+    found = modes(
+        chosen, None if at is None else at.split(","), points=points or 9, count=count,
+        latched=latched, tension=tension,
+    )  # fmt: skip
+    save(found, target)
+    for table in modes_tables(found):
+        for line in [table.title, *table.lines(), ""]:
+            click.echo(line)
+    click.echo(f"wrote {target}")
+    if plot:
+        draw_result(found, target.parent, target.stem, formats)
+    return EXIT_DONE
 
 
 @click.command()

@@ -1,4 +1,6 @@
-"""The corners: where they are, how hard they are accelerated, the shape that they leave."""
+"""The corners: where they are, how hard they are accelerated; the shape that they leave, and how it
+vibrates.
+"""
 
 import math
 
@@ -142,6 +144,28 @@ def deviations(places: Array, drawn: Array) -> Array:
     turn, _ = Rotation.align_vectors(*from_centre)
     apart = from_centre[0] - turn.apply(from_centre[1])
     return np.asarray(np.linalg.norm(apart, axis=1).reshape(places.shape[:-1]))
+
+
+class FirstFrequency(Output):
+    """Of the ring that a run leaves: fully open, all V-joints held by the stiffness of their stops.
+
+    Rods, masses, stops, net and gravity are the run's; see :func:`ringsim.modes`.
+    """
+
+    rank = 49
+    needs = ("frequency",)
+    variables = (
+        Variable(
+            "first_frequency", (), "Hz",
+            "lowest natural frequency of the deployed, latched ring, 0 if it is unstable; missing "
+            "if the run does not deploy",
+            summary=("first frequency", "10.4g"), worse="smaller",
+        ),
+    )  # fmt: skip
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Nothing: an engine's tangent tells it, see ``ringsim.simulation``."""
+        return {}
 
 
 class Prestress(Output):

@@ -386,6 +386,7 @@ def holds(scene: Scene) -> set[str]:
         "torque_constant": any(motor.torque_constant is not None for motor in motors),
         "reactions": scene.record.reactions,
         "shape": scene.record.shape,
+        "frequency": scene.record.frequency,
         "prestress": bool(strained(scene)),
         "base": scene.boom is not None or scene.structure.supported,
         "latches": scene.stop is not None and scene.stop.latch and scene.structure.locks,

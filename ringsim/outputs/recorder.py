@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.outputs.base import jerked, unresolved
-from ringsim.outputs.cables import slackened
 from ringsim.outputs.family import (
     COORDINATES,
     OUTPUTS,
@@ -25,6 +24,7 @@ from ringsim.outputs.family import (
     output_times,
 )
 from ringsim.outputs.joints import missed
+from ringsim.outputs.rods_and_cables import slackened
 from ringsim.parts.faults import AT_ONCE, Fault
 from ringsim.refusal import InputError, show
 from ringsim.scene import Scene

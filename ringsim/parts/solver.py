@@ -117,6 +117,9 @@ class Record(Model):
     """Record force and torque at the base, how it turns, and the impulse of every lock."""
     shape: bool = False
     """Record how far corners are at the end from the deployed design."""
+    frequency: bool = False
+    """Record the lowest natural frequency of the ring, deployed and latched, at rest with slack
+    ropes: of runs that deploy.  It takes about as long as ``ringsim modes`` at one angle."""
 
 
 # What the antenna must not be driven past.

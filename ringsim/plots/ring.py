@@ -277,6 +277,79 @@ def _scale_bar(axes: Axes, length: float, top: float) -> None:
     )  # fmt: skip
 
 
+# Natural frequencies along the opening, and shapes at the last angle.
+
+
+_SHAPES, _BENT = 4, 0.14
+"""Shapes that are drawn at most; their largest displacement over the size of the ring."""
+
+
+@style.styled
+def modes(found: xr.Dataset) -> Figure:
+    """Frequencies over the opening angle, and the first shapes at the last angle, enlarged.
+
+    ``found`` is from ``ringsim.vibration.modes``.  What is unstable is marked at zero.
+    """
+    scene = scene_from_toml(str(found.attrs["scene"]), source="attribute scene")
+    count = min(_SHAPES, found.sizes["mode"])
+    figure = Figure(figsize=(10.2, 6.3))
+    grid = figure.add_gridspec(2, count, height_ratios=(1.0, 0.62))
+    axes = figure.add_subplot(grid[0, :])
+    colours = style.section_colours(found.sizes["mode"])
+    latched = found["latched"].values == 1
+    for k, mode in enumerate(found["mode"].values):
+        each = found["frequency"].sel(mode=mode)
+        # Held V-joints make another structure: no line leads there.
+        for held, face in ((False, colours(k)), (True, "white")):
+            axes.plot(
+                found["angle"],
+                each.where(latched == held),
+                "o-",
+                color=colours(k),
+                markerfacecolor=face,
+                markersize=4.5,
+                label="_" if held else f"mode {mode}",
+            )
+    if latched.any():
+        axes.plot([], [], "o", color=style.INK, markerfacecolor="white", label="V-joints latched")
+    lost = found["angle"].values[(found["growth_rate"] > 0.0).any("mode").values]
+    axes.plot(lost, np.zeros(len(lost)), "X", color=style.VERMILLION, clip_on=False, zorder=4,
+              label="unstable" if len(lost) else "_")  # fmt: skip
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel(style.label(found["angle"]))
+    axes.set_ylabel("Natural frequency (Hz)")
+    axes.legend(loc="upper left", ncols=2)
+    last, azimuth = found.isel(angle=-1), facing_azimuth(scene)
+    points = points_of(layout_of(scene), scene.structure.planes)
+    rest = last["position"].transpose("point", "axis").values
+    size = float(np.ptp(rest, axis=0).max())
+    for k in range(count):
+        own = last.isel(mode=k)
+        moved = rest + _BENT * size * own["shape"].transpose("point", "axis").values
+        panel = figure.add_subplot(grid[1, k])
+        panel.set_axis_off()
+        for places, there in ((rest, False), (moved, True)):
+            parts = {n: ends for n, ends in points.drawn(places).items() if n != "V-joints"}
+            names = [name for name, ends in parts.items() for _ in ends]
+            lines, depths = view(np.concatenate(list(parts.values())), azimuth, _ELEVATION)
+            order = np.argsort(near := depths.mean(axis=-1), kind="stable")
+            if there:
+                _draw(panel, [names[n] for n in order], lines[order], near[order], 0.8)
+            else:
+                panel.add_collection(LineCollection(list(lines), colors=style.PALE, linewidths=0.8))
+        panel.set_aspect("equal")
+        panel.autoscale_view()
+        hertz = own["frequency"].item()
+        told = "unstable" if math.isnan(hertz) else f"{hertz:.4g} Hz"
+        part = str(found["part"].values[int(np.abs(own["energy_share"].values).argmax())])
+        panel.set_title(f"mode {k + 1}: {told}\n{part}", fontsize=9)
+    joints = "latched" if last["latched"] else "free"
+    figure.text(0.01, 0.005, f"shapes at {last['angle'].item():.4g} deg, V-joints {joints}, "
+                "enlarged", fontsize=8, color=style.GREY)  # fmt: skip
+    style.title(figure, str(found.attrs["title"]))
+    return figure
+
+
 # A planar truss over the length of its driving cable: tension, and strain of the upper beam.
 
 

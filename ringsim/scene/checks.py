@@ -18,6 +18,7 @@ def check_parts(scene: "Scene") -> None:
     _check_faults(scene)
     _check_rods(scene)
     _check_limits(scene)
+    _check_frequency(scene)
     _check_latch(scene)
     _check_margin(scene)
 
@@ -73,6 +74,20 @@ def _check_margin(scene: "Scene") -> None:
         )
     if reason := why_unlimited(scene.cables, scene.structure.planes):
         raise ValueError(reason)
+
+
+def _check_frequency(scene: "Scene") -> None:
+    if not scene.record.frequency:
+        return
+    name = "record.frequency = true"
+    if scene.stop is None:
+        raise ValueError(f'{name}: stop = "none" latches no V-joint: give stop.stiffness')
+    if (kind := kind_of(scene.rods)) != "geometrically-exact":
+        raise ValueError(f'{name}: rods.kind = "{kind}": frequencies are those of '
+                         "geometrically-exact rods: leave rods.kind out")  # fmt: skip
+    if "opening_angle" not in type(scene.structure).model_fields:
+        raise ValueError(f'{name}: structure.kind = "{kind_of(scene.structure)}" has no '
+                         "opening_angle: leave record.frequency out")  # fmt: skip
 
 
 _NO_SUCH = "no such parts"

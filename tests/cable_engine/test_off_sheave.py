@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 import ringsim
-from ringsim.outputs.cables import longest_above
+from ringsim.outputs.rods_and_cables import longest_above
 from ringsim.refusal import InputError
 from ringsim.variables import Fate
 

@@ -16,9 +16,9 @@ from motor_rings import MOTOR, STALL, ring
 from ringsim.analysis.design import endings
 from ringsim.analysis.intervals import quantities
 from ringsim.analysis.requirements import Requirement, violations
-from ringsim.outputs.cables import CableTension
 from ringsim.outputs.family import Run, Series
 from ringsim.outputs.joints import FastestLatch, Latching
+from ringsim.outputs.rods_and_cables import CableTension
 from ringsim.parts.joints import Latch
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError

@@ -12,11 +12,10 @@ from click.testing import CliRunner
 from ringsim.cli import cli
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import BaseReaction
-from ringsim.outputs.cables import CableTension, NetTension
 from ringsim.outputs.family import Run, Series, axes
 from ringsim.outputs.joints import Asynchrony
 from ringsim.outputs.motors import DriveMargins
-from ringsim.outputs.rods import RodStress
+from ringsim.outputs.rods_and_cables import CableTension, NetTension, RodStress
 from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES, simulate
 

@@ -13,9 +13,9 @@ from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winding import ConstantWinding
 from ringsim.core.chain import Chain
 from ringsim.layout.layout import layout_of
-from ringsim.outputs.cables import PulleyRatio
 from ringsim.outputs.family import Series
 from ringsim.outputs.meters import Meters, Reading
+from ringsim.outputs.rods_and_cables import PulleyRatio
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 from ringsim.stepping.instant import Energies

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from loops import for_each
 
 from ringsim.cli import cli
-from ringsim.reference.schema import schema_of
+from ringsim.reference.tree import schema_of
 from ringsim.scene import builtin_scenes, load_scene
 
 pytestmark = pytest.mark.quick

@@ -1,4 +1,4 @@
-"""The cables: tensions of spans, slack, pulleys' ratios, lengths."""
+"""The cables: tensions of spans, slack, pulleys' ratios, lengths; stress and strain of the rods."""
 
 import math
 import re
@@ -23,7 +23,7 @@ from ringsim.scene import Scene
 # Tensions of the cables' spans.
 
 
-PEAK = Peak("peak_tension", ("plane", "span"), "the largest tension", "cable_tension")
+TENSION_PEAK = Peak("peak_tension", ("plane", "span"), "the largest tension", "cable_tension")
 
 
 class CableTension(Output):
@@ -36,7 +36,7 @@ class CableTension(Output):
 
     rank = 40
     needs = ("cables",)
-    peak = PEAK
+    peak = TENSION_PEAK
     limit = "tension"
     variables = (
         Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
@@ -46,7 +46,7 @@ class CableTension(Output):
             error_bar=ErrorBar("largest tension", safety=1.8),
             summary=("largest tension", "10.3f"), worse="larger", largest_of="cable_tension",
         ),
-        *PEAK.variables,
+        *TENSION_PEAK.variables,
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
@@ -61,7 +61,7 @@ class CableTension(Output):
             before, last = times <= until, np.array([until])
             times = np.append(times[before], last)
             values = np.append(values[before], series.at(last), axis=0)
-        peak = {"peak_tension": np.nanmax(values)} | PEAK.of(run, times, values)
+        peak = {"peak_tension": np.nanmax(values)} | TENSION_PEAK.of(run, times, values)
         return super().reduce(run, series) | peak
 
 
@@ -325,3 +325,71 @@ class WoundLength(Output):
     def read(self, now: Reading) -> Array | None:
         """Shape (planes,), m; NaN where a plane has no cable."""
         return None if now.chain is None else now.by_plane(now.chain.wound.sum(axis=1))
+
+
+# Stress of the rods.
+
+
+STRESS_PEAK = Peak("peak_stress", ("rod", "section"), "the largest stress of a rod", "rod_stress")
+
+
+class RodStress(Output):
+    """Axial + bending stress at the ends of every rod half, and the largest at any step."""
+
+    rank = 30
+    needs = ("stress",)
+    peak = STRESS_PEAK
+    limit = "rod_stress"
+    coordinates = (Variable("rod", ("rod",), "1", "rod half of a section", "str"),)
+    variables = (
+        Variable(
+            "rod_stress", ("rod", "section", "time"), "Pa",
+            "axial + bending stress of a rod, elastic + viscous",
+        ),
+        Variable(
+            "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod",
+            error_bar=ErrorBar("largest stress", safety=4.0),
+            summary=("largest rod stress", "10.4g"), worse="larger", largest_of="rod_stress",
+        ),
+        *STRESS_PEAK.variables,
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array:
+        """Shape (rod halves, sections), Pa."""
+        return now.meters.stress()
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Interpolated, and the largest reading."""
+        values, peak = super().reduce(run, series), STRESS_PEAK.of(run, series.times, series.values)
+        return values | peak | {"peak_rod_stress": np.nanmax(series.values)}
+
+    def shocks(self, run: Run, series: Series) -> dict[str, float]:
+        """When the largest stress was."""
+        largest = np.nanmax(series.values.reshape(len(series.times), -1), axis=1)
+        return {"peak_rod_stress": float(series.times[largest.argmax()])}
+
+
+# Bending strain of the rod that carries a structure's gauge.
+
+
+class BendingStrain(Output):
+    """Strain of the outer fibre at the nodes, where a beam loaded at its nodes is bent most."""
+
+    rank = 44
+    needs = ("gauge",)
+    coordinates = (
+        Variable("station", ("station",), "m", "distance along the upper beam from the fixed axis"),
+    )
+    variables = (
+        Variable(
+            "bending_strain", ("station", "time"), "1", "bending strain of the upper beam's fibre"
+        ),
+        Variable(
+            "peak_bending_strain", (), "1", "largest bending strain of the upper beam at any step",
+            summary=("largest strain", "10.2e"), worse="larger", largest_of="bending_strain",
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array:
+        """Shape (stations,)."""
+        return now.meters.strain()
