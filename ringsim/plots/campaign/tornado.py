@@ -277,7 +277,7 @@ def tornado(campaign: xr.Dataset) -> Figure:
     return figure
 
 
-_LABEL = 46
+_LABEL = 48
 """Characters of a line below a panel's axis."""
 
 
