@@ -12,7 +12,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from ringsim.refusal import DEEPEST, InputError
+from ringsim.refusal import DEEPEST, InputError, shorten
 from ringsim.tables import size_text
 
 DESIGN, MERGED = "design.nc", "campaign.nc"
@@ -87,6 +87,21 @@ def _inside(found: Any) -> list[Any]:
     )
 
 
+def _toml_cure(error: str, text: str) -> str:
+    """The line that is no TOML, and what it is to be if it is one of the common slips."""
+    place = re.search(r"line (\d+)", error)
+    wrong = text.splitlines()[int(place[1]) - 1].strip() if place else ""
+    if not wrong:
+        return "; correct that line"
+    cure = ""
+    if word := re.fullmatch(r"([\w.\"-]+)\s*=\s*([A-Za-z][\w-]*)\s*(#.*)?", wrong):
+        cure = f': words need quotes: write {word[1]} = "{word[2]}"'
+    elif bound := re.match(r"([\w.-]+)\s*([<>])=?\s*([^\s#,]+)", wrong):
+        key = "max" if bound[2] == "<" else "min"
+        cure = f": write {bound[1]} = {{ {key} = {bound[3]}, probability = ..., confidence = ... }}"
+    return f"; correct that line, {shorten(wrong)}{cure}"
+
+
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The tables of a TOML text; an InputError begins with ``source``.
 
@@ -103,7 +118,9 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
             raise RecursionError
         return read
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}: not valid TOML: {error}; correct that line") from None
+        raise InputError(
+            f"{source}: not valid TOML: {error}{_toml_cure(str(error), text)}"
+        ) from None
     except RecursionError:
         raise InputError(f"{source}: its lists or tables are nested too deeply") from None
     except ValueError as error:

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from ringsim.choice import leaves_of
-from ringsim.units import EACH, LEFT_OUT, ONE, Model, nested_in, unit_of
+from ringsim.units import EACH, LEFT_OUT, ONE, Model, in_unit, nested_in, unit_of
 
 EXIT_DONE = 0
 EXIT_BAD_INPUT = 2
@@ -68,8 +68,8 @@ _SAYS = {
     "literal_error": "{shown} must be {expected}",
     "too_short": "{where} must have {min_length} or more entries",
     "too_long": "{where} must have {max_length} entries at most",
-    "model": "{shown} must be a table: write [{where}], and its keys on the lines below",
-    "dict": "{shown} must be a table: write [{where}], and its keys on the lines below",
+    "model": "{shown} must be a table: write {where} = {{ {keys} }}",
+    "dict": "{shown} must be a table: write {where} = {{ {keys} }}",
     "tuple": "{shown} must be one value, or a list with a value for each section",
 }
 """What is wrong with a value, by pydantic's word for the fault, or the type that it begins with."""
@@ -81,11 +81,16 @@ def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
     # A key that is none first: it may be the one that is missing, misspelt.
     faults.sort(key=lambda fault: fault["type"] != "extra_forbidden")
     line = f"{source}: {_describe(faults[0], model)}"
-    others = list(dict.fromkeys(_place(fault, model) for fault in faults[1:]))
-    if not others:
-        return line
-    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
-    return f"{line}; also at fault: {', '.join(others[:MOST_NAMED])}{more}"
+    groups: dict[str, list[str]] = {"also missing": [], "also at fault": []}
+    for fault in faults[1:]:
+        place, absent = _place(fault, model), fault["type"] == "missing"
+        meant = line.endswith(f"(did you mean {place.rpartition('.')[2]}?)")
+        own = groups["also missing" if absent else "also at fault"]
+        own += [place] * (place not in own and not (absent and meant))
+    for words, others in groups.items():
+        more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+        line += f"; {words}: {', '.join(others[:MOST_NAMED])}{more}" if others else ""
+    return line
 
 
 def known_or_nearest(key: str, known: Iterable[str]) -> str:
@@ -138,7 +143,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     path, owner, field = _walk(fault["loc"], model)
     where, key = ".".join(path), path[-1] if path else ""
     kind, value, limits = fault["type"], fault["input"], fault.get("ctx", {})
-    unit = f" {unit_of(field)}".removesuffix(" 1") if field is not None else ""
+    symbol = unit_of(field, path[-2] if len(path) > 1 else "") if field is not None else "1"
+    unit = f" {symbol}".removesuffix(" 1")
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     shown = f"{where} = {show(_few_digits(value))}{unit if number else ''}"
     tables = [] if field is None else models_in(field.annotation)
@@ -182,18 +188,35 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     if (says := _SAYS.get(kind) or _SAYS.get(kind.split("_")[0])) is None:
         return f"{shown}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
     in_unit = f" in{unit}" if unit else ""
-    line = says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
+    line = says.format(
+        shown=shown, where=where, key=key, unit=unit, in_unit=in_unit,
+        keys=_keys_of(tables[0]) if tables else "...", **limits,
+    )  # fmt: skip
     if unit == " K" and number and -272.15 <= value <= 0.0:
         return f"{line}; {value:g} C are {value + 273.15:g} K"
     if number and 1.0 < value <= 100.0 and limits.get("lt", limits.get("le")) == 1.0:
         return f"{line}; {value:g} % are {value / 100.0:g}"
     if not isinstance(value, str):
         return line
-    if meant := _meant(value, kind):
+    if meant := _meant(value, kind, symbol):
         return f"{line}: write {meant}"
     optional = field is not None and type(None) in typing.get_args(field.annotation)
     # Who writes "never" looks for the word that leaves a value out.
     return f'{line}, or "none" to leave it out' if optional else line
+
+
+def _keys_of(table: type[BaseModel]) -> str:
+    """The keys of a table that need a value, or its first one, as TOML is to have them; those that
+    a record calls usual.
+    """
+    fields = table.model_fields
+    names = [n for n, field in fields.items() if field.is_required()] or [*fields][:1]
+    needed = {name: fields[name] for name in getattr(table, "usual", names)}
+    return ", ".join(
+        f"{field.alias or name} = [{', '.join(['...'] * size)}]" if (size := _components(field))
+        else f"{field.alias or name} = ..."
+        for name, field in needed.items()
+    )  # fmt: skip
 
 
 def _components(field: FieldInfo | None) -> int:
@@ -203,14 +226,25 @@ def _components(field: FieldInfo | None) -> int:
     return next((len(each) for each in inner if Ellipsis not in each), 0)
 
 
-def _meant(text: str, kind: str) -> str:
-    """What a text may mean where a number or a truth is wanted; empty if nobody can tell."""
+def _meant(text: str, kind: str, wanted: str) -> str:
+    """What a text may mean where a number of a unit or a truth is wanted; empty if nobody can tell.
+
+    >>> _meant("100MPa", "float_type", "Pa"), _meant("2 knots", "float_type", "m/s")
+    ('1e+08', 'the number alone')
+    """
     if kind.startswith("bool"):
         return {"true": "true", "yes": "true", "false": "false", "no": "false"}.get(
             text.lower(), ""
         )
     number = re.match(r"[-+]?\d+([.,]\d+)?(e[-+]?\d+)?", text.strip(), re.IGNORECASE)
-    return number[0].replace(",", ".") if number and kind.startswith("float") else ""
+    if not number or not kind.startswith("float"):
+        return ""
+    alone, behind = number[0].replace(",", "."), text.strip()[number.end() :].strip()
+    behind = re.sub("degrees?|\N{DEGREE SIGN}$", "deg", behind)
+    if not behind or behind == wanted:
+        return alone
+    value = in_unit(float(alone), behind, wanted)
+    return "the number alone" if value is None else f"{value:.6g}"
 
 
 def _below(key: str, owner: type[BaseModel], prefix: str = "") -> Iterator[str]:

@@ -3,9 +3,12 @@ it is one value for all sections, or a list with one value for each.
 """
 
 import functools
+import math
 import operator
+import re
 import typing
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar, Union
 
@@ -38,10 +41,21 @@ class Unit:
     symbol: str
 
 
-def unit_of(field: FieldInfo) -> str:
-    """Symbol of the SI unit of a model's field, also of one in a list; "1" if it has none."""
-    parts = (part for top in (*field.metadata, field.annotation) for part in nested_in(top))
-    return next((part.symbol for part in parts if isinstance(part, Unit)), "1")
+@dataclass(frozen=True)
+class UnitOf:
+    """Marks a field in the unit of what its table is named by, as bounds of an output."""
+
+    symbol: Callable[[str], str]
+
+
+def unit_of(field: FieldInfo, table: str = "") -> str:
+    """Symbol of the SI unit of a model's field, also of one in a list; "1" if it has none.
+
+    ``table`` is the name of the table that holds the field, where the unit depends on it.
+    """
+    parts = [part for top in (*field.metadata, field.annotation) for part in nested_in(top)]
+    told = (part.symbol(table) for part in parts if table and isinstance(part, UnitOf))
+    return next((part.symbol for part in parts if isinstance(part, Unit)), next(told, "1"))
 
 
 def unit_at(record: BaseModel, path: str) -> str:
@@ -57,6 +71,48 @@ def nested_in(annotation: Any) -> Iterator[Any]:
     yield annotation
     for part in typing.get_args(annotation):
         yield from nested_in(part)
+
+
+_ATOMS = {
+    "1": (1.0, ""), "%": (1e-2, ""), "m": (1.0, "m"), "s": (1.0, "s"), "min": (60.0, "s"),
+    "h": (3600.0, "s"), "kg": (1.0, "kg"), "g": (1e-3, "kg"), "N": (1.0, "N"),
+    "Pa": (1.0, "N m^-2"), "K": (1.0, "K"), "A": (1.0, "A"), "W": (1.0, "N m s^-1"),
+    "J": (1.0, "N m"), "Nm": (1.0, "N m"), "rad": (1.0, "rad"), "deg": (math.pi / 180.0, "rad"),
+    "rev": (math.tau, "rad"), "rpm": (math.tau / 60.0, "rad s^-1"),
+}  # fmt: skip
+"""Units that people write: the factor, and the product of powers that it is in."""
+_PREFIXES = {"k": 1e3, "M": 1e6, "G": 1e9, "c": 1e-2, "m": 1e-3, "u": 1e-6, "\N{MICRO SIGN}": 1e-6}
+
+
+def in_unit(number: float, written: str, wanted: str) -> float | None:
+    """A number of one unit in another; None if either is not known or they are not alike.
+
+    >>> in_unit(100.0, "MPa", "Pa"), in_unit(60.0, "rpm", "rad/s"), in_unit(1.0, "kN", "m")
+    (100000000.0, 6.283185307179586, None)
+    """
+    own, other = _powers(written), _powers(wanted)
+    if own is None or other is None or own[1] != other[1]:
+        return None
+    return number * own[0] / other[0]
+
+
+def _powers(unit: str) -> tuple[float, dict[str, int]] | None:
+    """Factor and powers of a unit as it is written: ``N m/rad``, ``m/s^2``."""
+    factor, powers = 1.0, Counter[str]()
+    for side, text in enumerate(unit.split("/")):
+        for atom in text.split():
+            symbol, _, power = atom.partition("^")
+            prefix = 1.0
+            if symbol not in _ATOMS:
+                prefix, symbol = _PREFIXES.get(symbol[:1], 0.0), symbol[1:]
+            if not prefix or symbol not in _ATOMS or not re.fullmatch(r"(-?\d)?", power):
+                return None
+            sign = (-1 if side else 1) * int(power or 1)
+            factor *= (prefix * _ATOMS[symbol][0]) ** sign
+            for part in _ATOMS[symbol][1].split():
+                name, _, own = part.partition("^")
+                powers[name] += sign * int(own or 1)
+    return factor, {name: power for name, power in powers.items() if power}
 
 
 class Model(BaseModel):

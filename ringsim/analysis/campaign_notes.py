@@ -106,23 +106,32 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
     ]
 
 
-_LATE = re.compile(r"the least drive margin is that of .* before .*?(?:: from then on (\S+) .*)?$")
+_LATE = re.compile(
+    r"the least drive margin is that of .* before (\S+ starts at .*?)"
+    r"(?:: from then on (\S+) (at .*))?$"
+)
 
 
 def late_line(campaign: xr.Dataset) -> str:
-    """In how many samples the least drive margin is that of a time before a winch starts, with the
-    words of the one that has the least from then on; empty if in none.
+    """In how many samples the least drive margin is that of a time before a winch starts, and the
+    least of all samples from that start on; empty if in none.
     """
-    found, held = list[tuple[float, int, str]](), good(campaign)
+    found, held = list[tuple[float, int, re.Match[str]]](), good(campaign)
     for sample in np.flatnonzero(held).tolist() if "reason" in campaign else ():
         for remark in str(campaign["reason"].values[sample]).split("; ")[1:]:
             if late := _LATE.match(remark):
-                found.append((float(late[1] or "inf"), sample, remark))
+                found.append((float(late[2] or "inf"), sample, late))
     if not found:
         return ""
-    least, sample, remark = min(found)
-    which = "the worst of them sample" if np.isfinite(least) else "for example in sample"
-    return f"in {_of(len(found), int(held.sum()))}, {which} {sample}: {remark}"
+    least, sample, late = min(found, key=lambda each: each[:2])
+    names = re.findall(r"(\S+) starts at", late[1])
+    line = (
+        f"in {_of(len(found), int(held.sum()))} the least drive margin is that of a time before "
+        f"{' and '.join(names)} start{'s' * (len(names) == 1)}"
+    )
+    if not np.isfinite(least):
+        return line
+    return f"{line}; from then on all have at least {late[2]} (sample {sample}, {late[3]})"
 
 
 def _of(count: int, every: int) -> str:

@@ -44,7 +44,7 @@ from ringsim.analysis.requirements import (
     violations,
 )
 from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.verdicts import Verdict, judge
+from ringsim.analysis.verdicts import Verdict, judge, verdict_about, verdict_text
 from ringsim.analysis.worst import margins
 from ringsim.outputs.base import may_be_off
 from ringsim.overrides import flat
@@ -92,10 +92,10 @@ def differences_of_shares(both: Both, placed: Placements, pairs: Places) -> dict
         texts = np.array([*kept], dtype=object)
         found["requirement"] = "requirement", texts, {"long_name": "requirement of both"}
         found |= _told("kept", "requirement", kept, placed, both, pairs)
-        found["kept_verdict"] = (
-            ("requirement", "side"), _verdicts(both, placed, [*kept]),
-            about("verdict on the requirement") | flags_of(Verdict),
-        )  # fmt: skip
+        codes, texts = _verdicts(both, placed, [*kept])
+        both_sides, says = ("requirement", "side"), "verdict on the requirement"
+        found["kept_verdict"] = both_sides, codes, about(says) | flags_of(Verdict)
+        found["kept_verdict_text"] = both_sides, texts, {"long_name": f"{says} in words"}
     return found
 
 
@@ -135,24 +135,29 @@ def _moved(both: Both, placed: Placements) -> list[str]:
         words = []
         for campaign, its, wanted in zip(both, placed, (one, other), strict=True):
             try:
-                verdict = judge(campaign, {name: wanted[name]}, its)["verdict"].item()
+                verdict = verdict_about(judge(campaign, {name: wanted[name]}, its), name)
             except InputError:  # its file does not tell it
                 break
-            words.append(f"{wanted[name].told(name)}: {Verdict(verdict).words}")
+            words.append(f"{wanted[name].told(name)}: {verdict_text(verdict)}")
         lines += [" -> ".join(words)] * (len(words) == len(both))
     return lines
 
 
-def _verdicts(both: Both, placed: Placements, texts: list[str]) -> NDArray[np.int8]:
-    """What the samples of each campaign say of requirements in words, shape (requirement, side)."""
-    columns = []
+def _verdicts(
+    both: Both, placed: Placements, texts: list[str]
+) -> tuple[NDArray[np.int8], NDArray[np.object_]]:
+    """What the samples of each campaign say of requirements, each shape (requirement, side): the
+    verdict, and in words, with how many values may be off.
+    """
+    columns, words = [], []
     for campaign, its in zip(both, placed, strict=True):
-        wanted = {name: each for name, each in required_by(campaign.attrs).items()
-                  if each.told(name) in texts}  # fmt: skip
-        judged = judge(campaign, wanted, its)
-        known = dict(zip(judged["requirement_text"].values, judged["verdict"].values, strict=True))
-        columns.append([known[text] for text in texts])
-    return np.array(columns, dtype=np.int8).T
+        wanted = {each.told(name): name for name, each in required_by(campaign.attrs).items()}
+        names = [wanted[text] for text in texts]
+        judged = judge(campaign, {n: required_by(campaign.attrs)[n] for n in names}, its)
+        every = [verdict_about(judged, name) for name in names]
+        columns.append([one["verdict"] for one in every])
+        words.append([verdict_text(one) for one in every])
+    return np.array(columns, dtype=np.int8).T, np.array(words, dtype=object).T
 
 
 def _told(

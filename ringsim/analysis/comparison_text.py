@@ -9,7 +9,6 @@ from ringsim.analysis.campaign_notes import NOTE, marked
 from ringsim.analysis.indices import largest_by_chance
 from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section
-from ringsim.analysis.verdicts import Verdict
 from ringsim.outputs.base import DOUBT
 from ringsim.tables import (
     Table,
@@ -84,7 +83,7 @@ def _not_run(found: xr.Dataset) -> Iterator[str]:
 _COUNTED = "_doubtful"
 
 
-def _doubtful(found: xr.Dataset) -> dict[str, tuple[int, ...]]:
+def doubtful(found: xr.Dataset) -> dict[str, tuple[int, ...]]:
     """In how many samples of both runs say that an output may be off, if any does."""
     return {
         str(name).removesuffix(_COUNTED): tuple(found[name].values.tolist())
@@ -95,7 +94,7 @@ def _doubtful(found: xr.Dataset) -> dict[str, tuple[int, ...]]:
 def _doubts(found: xr.Dataset) -> Iterator[str]:
     """What runs themselves say of their numbers, alike ones together."""
     alike: dict[tuple[int, ...], list[str]] = {}
-    for name, counts in _doubtful(found).items():
+    for name, counts in doubtful(found).items():
         alike.setdefault(counts, []).append(name)
     names, told = names_of(found), list[str]()
     for counts, outputs in sorted(alike.items(), reverse=True):
@@ -117,7 +116,7 @@ def _doubts(found: xr.Dataset) -> Iterator[str]:
 
 def _questioned(table: Table, found: xr.Dataset) -> Table:
     """A table with the mark behind each output that may be off, and requirement or limit on it."""
-    names, limits = _doubtful(found), dict[str, str]()
+    names, limits = doubtful(found), dict[str, str]()
     if "limit" in found.dims:
         limits = dict(zip(found["limit"].values, found["limit_output"].values, strict=True))
     rows = [
@@ -157,11 +156,11 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
 
 def _other_verdicts(found: xr.Dataset) -> Iterator[str]:
     """The requirements whose verdict is another one in the second."""
-    for text in found["requirement"].values if "kept_verdict" in found else ():
-        first, second = found["kept_verdict"].sel(requirement=text).values.tolist()
-        mark = DOUBT if text.split()[0] in _doubtful(found) else ""
+    for text in found["requirement"].values if "kept_verdict_text" in found else ():
+        first, second = found["kept_verdict_text"].sel(requirement=text).values.tolist()
+        mark = DOUBT if text.split()[0] in doubtful(found) else ""
         if first != second:
-            yield f"{text}{mark}: {Verdict(first).words} -> {Verdict(second).words}"
+            yield f"{text}{mark}: {first} -> {second}"
 
 
 def _cut_off(found: xr.Dataset) -> Iterator[str]:
@@ -235,11 +234,10 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
             cells = [str(count) for count in counts]
         low, high = one[f"{word}_share_difference_interval"].tolist()
         apart = estimate_text(one[f"{word}_share_difference"].item(), low, high, 3)
-        codes = one.get(f"{word}_verdict", np.empty(0)).tolist()
-        verdicts = [Verdict(code).words for code in codes]
+        verdicts = one.get(f"{word}_verdict_text", np.empty(0)).tolist()
         rows.append((str(name), *cells, apart, interval_text(low, high, 3), *verdicts))
     heads: tuple[str, ...] = (head, *names_of(found), "difference", "95 % interval")
-    if f"{word}_verdict" in found:
+    if f"{word}_verdict_text" in found:
         heads += tuple(f"verdict in {name}" for name in names_of(found))
     columns = 3 if single else len(heads)
     return marked(Table(heads[:columns], [row[:columns] for row in rows]), found)

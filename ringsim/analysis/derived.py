@@ -95,7 +95,7 @@ class Derived(Model):
     def variable(self, name: str) -> Variable:
         """What files and tables say of it."""
         unit = self.told().symbol if self.unit is None else self.unit
-        return Variable(name, (), unit, self.meaning or self.of, worse=self.worse)
+        return Variable(name, (), unit, self.meaning or f"{name} = {self.of}", worse=self.worse)
 
     def values(self, known: Mapping[str, xr.DataArray]) -> Any:
         """Its values, NaN where there are none; ``known`` are the variables that it reads."""

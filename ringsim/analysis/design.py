@@ -304,11 +304,19 @@ def median_and_worst(campaign: xr.Dataset) -> tuple[int, int] | None:
     return int(samples[order[(len(order) - 1) // 2]]), int(samples[order[-1]])
 
 
+BARS = "solver.error_bars"
+"""Path of the setting that ``error_bars_every`` of a campaign's file makes."""
+
+
 def inputs(campaign: xr.Dataset) -> list[str]:
-    """A variable for each drawn input: the first of those that share its values."""
+    """A variable for each drawn input: the first of those that share its values.
+
+    Which samples have error bars is no input: ``error_bars_every`` says it, and no law.
+    """
     found: dict[str, str] = {}
     for name, variable in campaign.variables.items():  # an array of each would take a third of ms
-        if variable.attrs.get("role") == "input":
+        says = variable.attrs
+        if says.get("role") == "input" and says.get("path") != BARS:
             found.setdefault(called(campaign[name]), str(name))
     return [*found.values()]
 
@@ -393,8 +401,6 @@ def drawn(campaign: xr.Dataset) -> Drawn:
     """
     found: dict[str, tuple[Array, str, str, tuple[int, int]]] = {}
     for variable in (campaign[name] for name in inputs(campaign)):
-        if variable.attrs.get("path") == "solver.error_bars":
-            continue
         own, values = called(variable), variable.to_numpy()
         if values.dtype.kind in "OUS":
             words, counts = np.unique(values.astype(str), return_counts=True)

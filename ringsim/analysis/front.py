@@ -69,7 +69,8 @@ def write_front(
     aimed_at = "quantile aimed at less the bound"
     says: dict[str, tuple[tuple[str, ...], Any, str]] = {
         "tried_value": (("tried", "variable"), [values(p) for p in found.points],
-                        "values of all designs that were tried"),
+                        "values of all designs that were run: first those of the search, then "
+                        "chosen ones with one variable as at present"),
         "tried_objective": (("tried", "objective"), shown(found.judged),
                             "statistic by the few samples of the search"),
         "tried_beyond": (("tried", "bound"), beyond(found.judged),
@@ -246,6 +247,8 @@ def _notes(found: "xr.Dataset", names: list[str]) -> list[str]:
         f"designs with {int(about['samples'])} samples each, and checked {checks} of them with "
         f"{int(about['check_samples'])} others"
     ]
+    if more := found.sizes["tried"] - int(about["designs"]):
+        notes[0] += f"; {counted(more, 'further design')} with one variable as at present"
     if both:
         notes.append(f"the full engine has run {both} of the fresh samples of each design, too")
     far, lost = found["check_beyond"].values, found["check_lost"].values

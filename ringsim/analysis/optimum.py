@@ -34,6 +34,7 @@ from ringsim.analysis.requirements import Requirement
 from ringsim.stepping.instant import Array
 from ringsim.tables import with_unit
 
+Without = tuple[int, int] | None  # the number of a chosen design, and its variable as at present
 SEARCH, CHECK, VERDICT = "search", "check", "verdict"
 """Which samples a design is run with: few, the same for all; more; and fresh ones."""
 _FIRST_STEP, _LATER_STEP, _LAST_STEP = 0.25, 0.1, 0.005
@@ -246,6 +247,7 @@ class Wanted(NamedTuple):
     point: Array
     best: Array | None = None
     """Objectives of the best design so far; none before the first."""
+    without: Without = None
 
 
 @dataclass
@@ -339,11 +341,11 @@ class Archive:
         self.scales: Array = np.ones(0, dtype=np.float64)
         """Of the objectives, then of the bounds."""
 
-    def at(self, point: Array) -> Generator[Wanted, Values, int]:
+    def at(self, point: Array, without: Without = None) -> Generator[Wanted, Values, int]:
         """The place of a design, after a run if it has none."""
         found, point = self.found, np.round(point, DIGITS)
         if (place := self._places.get(point.tobytes())) is None:
-            values = yield Wanted(SEARCH, point, self._best_so_far())
+            values = yield Wanted(SEARCH, point, self._best_so_far(), without)
             place = self._places[point.tobytes()] = len(found.points)
             found.points.append(point)
             found.judged.append(judged(self.problem, values))
@@ -359,9 +361,8 @@ class Archive:
         return bool((np.abs(told.parts - foretold) <= told.errors + _TINY).all())
 
     def _best_so_far(self) -> Array | None:
-        if not self.found.points:
-            return None
-        return np.asarray(self.estimates()[1][self.best(0), : len(self.problem.objectives)])
+        aims = len(self.problem.objectives)
+        return self.estimates()[1][self.best(0), :aims] if self.found.points else None
 
     def _scale(self, first: Judged) -> None:
         sizes = np.zeros(len(first.parts))
@@ -525,11 +526,10 @@ def course(problem: Problem) -> Course:
     places = list(dict.fromkeys(archive.choice(0, level) for level in levels))
     found.searched = len(found.points)
     found.chosen = [Chosen(k) for k in places if k and not _is_dominated(found, k, places)]
-    for chosen in found.chosen:
+    for number, chosen in enumerate(found.chosen):
         for k, value in enumerate(start):
-            point = found.points[chosen.place].copy()
-            point[k] = value
-            chosen.without.append(found.judged[(yield from archive.at(point))])
+            point = np.where(np.arange(len(start)) == k, value, found.points[chosen.place])
+            chosen.without.append(found.judged[(yield from archive.at(point, (number, k)))])
     found.corrected = archive.estimates()[1]
     return found
 

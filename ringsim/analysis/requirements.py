@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
@@ -17,7 +17,7 @@ from ringsim.outputs.balance import instead_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted, unit_text, with_unit
-from ringsim.units import Model
+from ringsim.units import Model, UnitOf
 from ringsim.variables import Fate
 
 if TYPE_CHECKING:
@@ -48,12 +48,20 @@ KINDS = (
 """A further one is a record here, and a field of ``Requirement``."""
 
 
+def _unit_of_output(name: str) -> str:
+    return unit_text(quantities()[name].units) or "1" if name in quantities() else "1"
+
+
+_OF_OUTPUT = UnitOf(_unit_of_output)
+
+
 class Requirement(Model):
     """What one output must be, with which probability, shown with which confidence."""
 
-    max: float | None = None
+    usual: ClassVar = ("max", "probability", "confidence")
+    max: Annotated[float | None, _OF_OUTPUT] = None
     """Largest value allowed, in the output's unit."""
-    min: float | None = None
+    min: Annotated[float | None, _OF_OUTPUT] = None
     """Smallest value allowed, in the output's unit."""
     is_: Annotated[str | None, Field(alias="is")] = None
     """What the antenna must do; of the outcome alone."""

@@ -345,9 +345,11 @@ def _parts() -> list[str]:
 
 def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     """Mean with its interval, scatter, quantiles and range of each output, and its worst sample;
-    of when peaks were only if ``every`` one is told.
+    of when peaks were, and of what differs by less than its error bar and no requirement names,
+    only if ``every`` one is told.
     """
-    rows, few, alike = [], False, list[str]()
+    rows, few, alike, within = [], False, list[str](), list[str]()
+    wanted = analysis["requirement"].values if "requirement" in analysis.dims else ()
     for name in outputs_in(analysis):
         if is_moment(name) and not every:
             continue
@@ -356,16 +358,16 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         mean, deviation, *quantiles, least, most = values
         used, run = counts[0], counts[:3].sum()  # what has not run is the last
         count = str(used) if used == run else f"{used} of {run}"
-        within = factor * float(analysis[f"{name}_same_within"])
-        if all_alike(least, most) or np.isfinite(within):
-            value = mean if np.isfinite(mean) else least  # no mean without a population
-            value = "0" if abs(value) < NOTHING else f"{number_text(value)} {units}".rstrip()
-            error = f" (within its error bar of {within:.2g} {units}".rstrip() + ")"
-            alike.append(
-                f"{name} {value}{error * (within > 0)}" + f" (in {count})" * int(used < run)
-            )
-        elif np.isfinite(least):
-            fine = digits_of(least, most)
+        bar, fine = factor * float(analysis[f"{name}_same_within"]), digits_of(least, most)
+        if all_alike(least, most):
+            value = "0" if abs(least) < NOTHING else f"{number_text(least)} {units}".rstrip()
+            alike.append(f"{name} {value}" + f" (in {count})" * int(used < run))
+            continue
+        if np.isfinite(bar):
+            inside = f", mean {fine_text(mean, fine)}" * bool(np.isfinite(mean))
+            told = f"{fine_text(least, fine)} .. {fine_text(most, fine)} {units}".rstrip()
+            within.append(f"{name} {told}{inside}, error bar {bar:.2g}")
+        if np.isfinite(least) and (every or np.isnan(bar) or name in wanted):
             low, high = (factor * analysis[f"{name}_interval"].values[0]).tolist()
             scatters = np.isfinite(analysis[f"{name}_error_of_mean"].values[0])
             few |= bool(scatters and np.isnan(low) and used < LEAST_OF_BOOTSTRAP)
@@ -380,6 +382,8 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         "least", "most", "worst sample", "samples used",
     )  # fmt: skip
     notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
+    if within:
+        notes.append(f"differ by less than their numerical error: {'; '.join(within)}")
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
 
 
@@ -452,9 +456,10 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
     """The error budget: what makes means wrong, by how much and where it is largest, as far as
     there is more than the error of sampling (or ``every`` one); then errors of the solution itself.
     """
-    rows, wanted = [], every
+    rows, at_length = [], every
+    wanted = analysis["requirement"].values if "requirement" in analysis.dims else ()
     for name in outputs_in(analysis):
-        if is_moment(name) and not wanted:
+        if is_moment(name) and not at_length:
             continue
         errors, counts, largest, samples = (
             analysis.variables[f"{name}_{word}"].values
@@ -462,8 +467,9 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         )
         mean, *_, least, most = analysis[name].values
         known = np.isfinite(errors)
-        same = all_alike(least, most) or np.isfinite(analysis[f"{name}_same_within"])
-        if same or not (known.any() and np.isfinite(mean)):
+        within = bool(np.isfinite(analysis[f"{name}_same_within"]))
+        same = within and not (at_length or name in wanted)
+        if same or all_alike(least, most) or not (known.any() and np.isfinite(mean)):
             continue
         every |= bool(known[1:].any())
         factor, units = unit_of(analysis, name)
@@ -483,7 +489,8 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         "samples with bars", "largest bar", "engines (difference)", "samples checked",
         "largest difference", "dominates",
     )  # fmt: skip
-    tables = [marked(Table(head, rows), analysis)] if every else []
+    notes = [OF_ERRORS] * any(any(c != "-" for c in (row[3], row[6])) for row in rows)
+    tables = [marked(Table(head, rows, notes), analysis)] if every else []
     if "balance" in analysis.dims:
         columns = (analysis[f"balance_{word}"].values.tolist()
                    for word in ("median", "largest", "sample", "samples"))  # fmt: skip
@@ -496,11 +503,16 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         ]
         of_solution = "error of the solution", "median", "largest", "samples"
         tables.append(marked(Table(of_solution, balances), analysis))
-    if (remarks := analysis.attrs.get("remarks")) and not wanted:
+    if (remarks := analysis.attrs.get("remarks")) and not at_length:
         tables.append(Table((), (), remarks.split("\n")))
     return tables
 
 
+OF_ERRORS = (
+    "numerical, engines: root mean square of the error bars, and of the differences of the "
+    "engines, over the samples that have them; samples err alike, so that their mean errs as much"
+)
+"""What the columns of the error budget are."""
 _NO_ERROR = 1e-7
 """Error over the value below which it is told as 0: no output is known to so many digits."""
 

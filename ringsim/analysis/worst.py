@@ -85,7 +85,6 @@ def unusual(
     if one_at_a_time(campaign):
         return [other_than_base(campaign, place) for place in places]
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
-    variables = {k: v for k, v in variables.items() if v.attrs.get("path") != "solver.error_bars"}
     columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
     for place, sides in zip(places, separating or [{}] * len(places), strict=True):
         told, named = list[str](), set[str]()

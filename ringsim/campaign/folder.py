@@ -252,9 +252,16 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
             change = ": it was written by an older version of ringsim, which can finish it"
         what = f"{what} differs{change}"
     elif not table.starts_with(old.table):
+        changed = _changed_input(table, old.table)
+        if table.samples < old.table.samples and not changed:
+            raise InputError(
+                f"{old.path} was begun with {old.table.samples} samples, {campaign.file.name} now "
+                f"asks for {table.samples}: give --samples {old.table.samples} to go on, or "
+                "another folder with --out"
+            )
         what = (
             f"its {old.table.samples} samples are not the first of the {table.samples} of "
-            f"{campaign.file.name}{_changed_input(table, old.table)}"
+            f"{campaign.file.name}{changed}"
         )
     if what:
         raise InputError(

@@ -343,7 +343,10 @@ class _Course:
             told = "check of the best design"
             if self.wanted.samples == SEARCH:
                 told = f"design {self.tried} of at most {most}"
-                told = told if self.tried <= most else "what a variable buys"
+                if self.wanted.without is not None:
+                    which, k = self.wanted.without
+                    name_of = [*self.given.budget.variables]
+                    told = f"design-{which + 1} with {name_of[k]} as at present"
             told += self._best(self.wanted.best)
         else:
             if not self.verdicts:

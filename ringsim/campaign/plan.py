@@ -72,7 +72,7 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
         ),
         f"  folder         {order.folder}",
         f"  workers        {workers}",
-        *map(_extent, table.columns),
+        *map(extent_told, table.columns),
     ]
     recorded = [
         name for name, each in campaign.specification.outputs.items()
@@ -80,9 +80,9 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     ]  # fmt: skip
     if recorded:
         lines.append(
-            f"  outputs        {', '.join(recorded)} reads records every "
-            f"{campaign.scene.record.interval:g} s: a shorter peak is missed; a smaller "
-            "record.interval shows it"
+            f"  outputs        read from records every {campaign.scene.record.interval:g} s: "
+            f"{', '.join(recorded)}; peaks between two records are missed, a smaller "
+            "record.interval shows them"
         )
     placed = placement_of(design)
     if placed.population and not placed.has_intervals:
@@ -226,8 +226,13 @@ def _confounded(table: Table) -> list[str]:
     ]
 
 
-def _extent(column: Column) -> str:
+def extent_told(column: Column) -> str:
+    """A line with the values of an input, or with the samples that have error bars."""
     values = column.values
+    if column.path == "solver.error_bars" and values.dtype.kind == "b":
+        barred = np.flatnonzero(values).tolist()
+        shown = ", ".join(map(str, barred[:_MOST_SHOWN])) + ", ..." * (len(barred) > _MOST_SHOWN)
+        return f"  error bars     samples {shown}"
     unit = column.units if column.has_numbers and column.units != "1" else ""
     if values.dtype.kind in "iuf":
         extent = f"{values.min():.6g} to {values.max():.6g} {unit}".rstrip()

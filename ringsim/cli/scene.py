@@ -153,6 +153,9 @@ _USUAL = {
         1e6, 1e10, "plastics bear more than 1 MPa, and no fibre 10 GPa; files give it in Pa"),
 }  # fmt: skip
 """The least and the largest value, by path, that are not taken for a slip, and why."""
+_FASTEST = 2e3
+"""Speed of a motor without load, rad/s, above which a figure of it is taken for one in rev/min:
+19,100 of them."""
 _SOFT = 1e3
 """Axial stiffness of a rod, N, below which a figure of it is taken for a slip: the 10 N of a rope
 make it longer by a hundredth."""
@@ -172,6 +175,12 @@ def _doubtful(scene: Scene) -> Iterator[str]:
         winches = {"winch": cable.winch, "far_winch": cable.far_winch}
         for name, winch in ((n, w) for n, w in winches.items() if w is not None):
             radius = getattr(winch.winding, "drum_radius", None)
+            speed = getattr(winch.winding, "no_load_speed", 0.0)
+            if speed > _FASTEST:
+                yield (
+                    f"{path}.{name}.winding.no_load_speed = {speed:g} rad/s is above {_FASTEST:g} "
+                    f"rad/s: {speed:g} rev/min are {speed * math.tau / 60.0:.4g} rad/s"
+                )
             radii |= {} if radius is None else {f"{path}.{name}.winding.drum_radius": radius}
             for key in ("start_time", "stop_time"):
                 if (time := getattr(winch, key)) is not None and time > end:

@@ -210,6 +210,12 @@ def below_limits(scene: Scene, values: Values) -> Iterator[str]:
                 f"{peak.summary[0]}: margin {most / largest - 1.0:+.3g} (limit / value - 1) to "
                 f"limits.{output.limit} = {with_unit(f'{most:g}', peak.units)}"
             )
+    most, longest = scene.limits.slack_duration, float(values.get("longest_slack", np.nan))
+    if most is not None and 0.0 < longest <= most:
+        yield (
+            f"longest slack: margin {most / longest - 1.0:+.3g} (limit / value - 1) to "
+            f"limits.slack_duration = {most:g} s"
+        )
 
 
 def ended(

@@ -110,7 +110,7 @@ class Spacecraft(Model):
         if scene.boom.base != "free":
             raise ValueError(
                 f'boom.base = "{scene.boom.base}" must be "free" with a spacecraft, which moves: '
-                "change it, or leave the spacecraft out"
+                'change it, or leave the spacecraft out (spacecraft = "none")'
             )
 
     @property

@@ -59,14 +59,15 @@ class MarginStandard(Model):
 
 
 class EcssMechanisms(MarginStandard):
-    """Actuation at least 2 (1.1 I + 1.2 S + 1.5 H_M + 3 (F_R + H_Y + H_A + H_D)) + 1.25 F_D + F_L,
-    no help of speed.
+    """Actuation at least 2 (1.1 inertia + 1.2 springs + 1.5 losses of the motor + 3 (friction +
+    hysteresis + adhesion + harness)) + 1.25 inertia of a motion that is asked for + force to be
+    delivered, no help of speed.
 
-    Source: ECSS-E-ST-33-01C (6 March 2009), 4.7.5.3: I inertia in an accelerated frame, S springs,
-    F_R friction, also of gears; F_D inertia at a motion that is asked for (``keep_speed``).  Motor
-    losses H_M belong to the motor's line here, hysteresis, adhesion and harness have no model, and
-    no force F_L is delivered.  Rev. 1 (2017) and Rev. 2 (2019) have not been read: check the
-    factors against the edition that a project names.
+    Source: ECSS-E-ST-33-01C (6 March 2009), 4.7.5.3, where these are I, S, H_M, F_R, H_Y, H_A,
+    H_D, F_D and F_L.  I is of parts in an accelerated frame.  Gears count as friction.  Losses of
+    the motor belong to the motor's line here; hysteresis, adhesion and harness have no model, and
+    no force is delivered.  Rev. 1 (2017) and Rev. 2 (2019) have not been read: check the factors
+    against the edition that a project names.
     """
 
     kind: Literal["ecss-e-st-33-01c"] = "ecss-e-st-33-01c"

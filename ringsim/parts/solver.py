@@ -146,9 +146,9 @@ class Limits(Model):
     """Longest time for which any span may be slack without a break, before its plane has locked: a
     rope that is slack for longer may leave its pulleys, and the outcome is "slackened"."""
     slack_length: MetreOrZero = 1e-4
-    """Free rope in a span, beyond its length, from which on that counts.  With s of it L metre of
-    span sag by sqrt(3 L s / 8), 0.4 m with 0.1 mm by 4 mm, about as deep as the groove of a small
-    pulley."""
+    """Free rope in a span, beyond its length, from which on that counts.  A span of L metres
+    with s metres of free rope sags by sqrt(3 L s / 8): 4 mm, the depth of a small pulley's groove,
+    for L = 0.4 m and s = 0.1 mm."""
 
     @property
     def farthest(self) -> float:

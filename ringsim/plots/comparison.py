@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from ringsim.analysis.comparison import paired, samples_of
-from ringsim.analysis.comparison_text import differing, names_of
+from ringsim.analysis.comparison_text import differing, doubtful, names_of
 from ringsim.analysis.courses import deployed, names_of_ends
 from ringsim.analysis.design import (
     blocks,
@@ -29,6 +29,7 @@ from ringsim.plots.campaign.frame import (
     drawable,
     legend,
     limits,
+    mark_panels,
     middle_told,
     of_cases,
     shown_until,
@@ -66,6 +67,7 @@ def figures_of_both(
     """Name, what it shows in words, and figure, of what ``compare`` has found of two datasets."""
     for name, words, figure in _figures(found, first, second):
         style.in_readable_units(figure)
+        mark_panels(figure, doubtful(found))
         yield name, words, figure
 
 

@@ -255,9 +255,9 @@ def _reached(axes: Axes, found: xr.Dataset) -> None:
             found["objective"].values, found["objective_sign"].values, strict=True
         )
     ]  # fmt: skip
-    axes.set_ylabel(unit_behind(words[0], units[0]))
+    axes.set_ylabel(textwrap.fill(unit_behind(words[0], units[0]), 36))
     if two:
-        axes.set_xlabel(unit_behind(words[1], units[1]))
+        axes.set_xlabel(textwrap.fill(unit_behind(words[1], units[1]), 60))
     else:
         some = sorted({1, *np.linspace(1, count, 5).round().astype(int).tolist()})
         places = [count + wide * (k + 1) for k in range(len(names))]

@@ -168,7 +168,8 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     """
     words = str(variable.attrs.get("long_name", variable.name))
     units = str(variable.attrs.get("units", "1")) if units is None else units
-    words = words[:1].upper() + words[1:]
+    if not words.startswith(f"{variable.name} = "):  # an output by an expression
+        words = words[:1].upper() + words[1:]
     held = unit_behind(words, units.replace(" ", FIXED))
     return textwrap.fill(held, width).replace(FIXED, " ")
 

@@ -14,6 +14,7 @@ import xarray as xr
 from ringsim.analysis import comparison_text
 from ringsim.analysis.campaign_notes import override_lines, peak_lines, restart_lines
 from ringsim.analysis.design import (
+    BARS,
     LOST,
     NOT_RUN,
     REACHED,
@@ -106,8 +107,6 @@ def drawn_inputs(campaign: xr.Dataset) -> Rows:
     rows, held = [], ran(campaign)
     for name in inputs(campaign):
         variable = campaign[name]
-        if variable.attrs.get("path") == "solver.error_bars":  # drawn by nobody
-            continue
         law, values = law_text(distribution_of(variable)), variable.to_numpy()
         values = values[held] if held.any() else values
         if values.dtype.kind in "OU":
@@ -155,6 +154,7 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
     wanted = campaign_file(campaign)
     settings = flat(wanted.get("set", {}))
     called = str(campaign.attrs.get("campaign", ""))
+    settings |= {BARS: True} if wanted.get("error_bars_every") else {}
     settings |= dict.fromkeys(re.findall(r"^# called with --set (\S+) =", called, re.MULTILINE))
     drawn = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
     text = builtin_scenes().get(str(wanted.get("scene", "")), "")

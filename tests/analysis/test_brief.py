@@ -13,7 +13,7 @@ from made import drawn_campaign
 from ringsim.analysis.influence import apart
 from ringsim.analysis.influence_text import what_matters, what_separates
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import statistics_table, told
+from ringsim.analysis.study_text import OF_ERRORS, error_tables, statistics_table, told
 from ringsim.sampling.designs.independent import RandomDesign, Sobol
 
 pytestmark = pytest.mark.quick
@@ -114,10 +114,22 @@ def test_what_differs_by_less_than_its_numerical_error_is_one_value():
     one = analyse(made)
     table, told_of = statistics_table(one), "\n".join(told(one))
     assert [row[0] for row in table.rows] == ["asynchrony_max"]
+    least, most = made.peak_tension.values.min(), made.peak_tension.values.max()
+    inside = f"{least:.4g} .. {most:.4g} N, mean {made.peak_tension.values.mean():.4g}"
     assert table.notes == [
-        "the same in all samples: peak_tension 40 N (within its error bar of 0.11 N)"
+        f"differ by less than their numerical error: peak_tension {inside}, error bar 0.11"
     ]
     assert told_of.count("peak_tension") == 1
+    # --full has its statistics, and a requirement brings it into the tables.
+    full = statistics_table(one, every=True)
+    assert [row[0] for row in full.rows] == ["asynchrony_max", "peak_tension"]
+    bound = {"peak_tension": {"max": 40.0, "probability": 0.1, "confidence": 0.9}}
+    required = analyse(made, bound)
+    (row,) = (row for row in statistics_table(required).rows if row[0] == "peak_tension")
+    assert [float(row[k]) for k in (8, 9)] == pytest.approx([least, most], rel=1e-3)
+    (budget, *_) = error_tables(required)
+    assert "peak_tension" in [each[0] for each in budget.rows]
+    assert budget.notes[-1] == OF_ERRORS
     assert "peak_tension" not in one.output.values
     assert "peak_tension_rank_correlation" not in one
     # Half of that error is less than what is seen, and a single sample may be enough.

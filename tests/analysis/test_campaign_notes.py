@@ -136,7 +136,10 @@ def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> Non
                           for k, m in ((1, 0.3), (2, -0.2), (3, 0.1)))]  # fmt: skip
     made["reason"] = "sample", np.array(reasons, dtype=object)
     made["least_drive_margin"] = "sample", np.array([0.1, -0.5, -0.6, -0.7])
-    line = f"in 3 of 4 samples, the worst of them sample 2: {words.format(2)}: from then on -0.200"
+    line = (
+        "in 3 of 4 samples the least drive margin is that of a time before cables.lower.winch "
+        "starts; from then on all have at least -0.200 (sample 2, at 14 deg)"
+    )
     assert line in "\n".join(margin_table(analyse(made)).notes)
     assert late_line(made).startswith(line)
     assert not remark_lines(made)

@@ -313,7 +313,7 @@ def test_a_plan_tells_that_records_miss_short_peaks(tmp_path: Path) -> None:
     file.write_text(FILE.format(outputs="x = 'max(asynchrony)'", more=""), encoding="utf-8")
     done = CliRunner().invoke(cli, ["campaign", str(file), "--dry-run", f"--out={tmp_path / 'o'}"])
     assert done.exit_code == EXIT_DONE
-    assert "reads records every 0.05 s" in done.output
+    assert "read from records every 0.05 s: x; peaks between two records are missed" in done.output
     bad = CliRunner().invoke(cli, ["analyse", str(tmp_path / "o")])
     assert bad.exit_code == EXIT_BAD_INPUT
 

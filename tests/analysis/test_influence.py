@@ -11,7 +11,7 @@ from scipy.stats import norm, spearmanr
 
 from made import campaign, points
 from ringsim.analysis import indices
-from ringsim.analysis.design import drawn
+from ringsim.analysis.design import drawn, inputs
 from ringsim.analysis.influence_text import influence_tables
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
@@ -217,6 +217,7 @@ def test_inputs_that_were_not_drawn_are_left_out():
     made["solver_error_bars"] = (
         "sample", np.arange(20) % 8 == 0, {"role": "input", "path": "solver.error_bars"}
     )  # fmt: skip
+    assert "solver_error_bars" not in inputs(made)
     assert not drawn(made).names
     assert "input" not in analyse(made).dims
     assert isinstance(analyse(made), xr.Dataset)

@@ -49,7 +49,11 @@ def test_both_ways_of_writing_read_alike():
         ({"peak_tension": {"max": 1.0, "probability": 0.9, "confidence": 9}}, "must be below 1"),
         ({"outcome": {"max": 1.0, **SHOWN}}, 'for example is = "deployed"'),
         ({"outcome": {"is": "deplyed", **SHOWN}}, r"did you mean deployed\?"),
-        ({"peak_tension": 5.0}, "must be a table"),
+        ({"peak_tension": {"max": "0.2 kN", **SHOWN}}, "in N, without quotes: write 200$"),
+        ({"asynchrony_max": {"max": "0.2 rad", **SHOWN}}, "in deg, .* write 11.4592$"),
+        ({"deployment_time": {"max": "1 min", **SHOWN}}, "in s, .* write 60$"),
+        ({"deployment_time": {"max": "1 N", **SHOWN}}, "in s, .* write the number alone$"),
+        ({"peak_tension": 5.0}, r"must be a table: write requirements.peak_tension = \{ max = "),
         ({"outcome": {"is": 3, **SHOWN}}, "must be text in quotes"),
     ],
 )

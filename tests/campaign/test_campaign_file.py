@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from loops import for_each
 
+from ringsim.campaign.plan import extent_told
 from ringsim.campaign.specification import load_campaign
 from ringsim.execution.work import longest_first, relative_cost
 from ringsim.refusal import InputError
@@ -246,6 +247,8 @@ def test_samples_with_error_bars_cost_more_and_are_no_trial(tmp_path):
     plain = relative_cost(without, campaign.scene)
     np.testing.assert_allclose(cost / plain, np.where(barred, 3.3, 1.0) * (cost / plain)[1])
     assert not barred[np.argsort(cost)[4]]
+    (bars,) = (column for column in table.columns if column.path == "solver.error_bars")
+    assert extent_told(bars) == "  error bars     samples 0, 4"
 
 
 @pytest.mark.skipif(shutil.which("ncdump") is None, reason="there is no ncdump")

@@ -95,7 +95,6 @@ def test_merging_twice_gives_the_same_values(copied):
         ('"solver.end_time" = 20.0', '"solver.end_time" = 21.0', "its scene"),
         ('"net.stiffness" =', '"net.damping" =', "its inputs"),
         ("high = 0.05", "high = 0.06", "20 samples are not the first"),
-        ("samples = 20", "samples = 10", "20 samples are not the first of the 10"),
     ],
 )
 def test_folder_of_another_campaign_is_refused(old, new, named, copied):
@@ -105,6 +104,18 @@ def test_folder_of_another_campaign_is_refused(old, new, named, copied):
     assert "this folder has another campaign" in printed
     assert named in printed
     assert "--out" in printed
+
+
+def test_a_folder_with_more_samples_is_told_how_to_go_on(copied):
+    """As it was begun with --samples."""
+    file = copied.folder / "small.toml"
+    file.write_text(file.read_text().replace("samples = 20", "samples = 10"))
+    printed = copied.run("campaign", file, "--out", "out", code=2)
+    assert printed.strip().endswith(
+        "out was begun with 20 samples, small.toml now asks for 10: give --samples 20 to go on, or "
+        "another folder with --out"
+    )
+    copied.run("campaign", file, "--out", "out", "--samples", "20")
 
 
 def test_folder_with_other_files_is_refused(bench):

@@ -251,6 +251,11 @@ def test_tables_say_what_is_broken_and_worse(found):
     assert "design-1 is least beyond (deployment_time <= 1.6 by 0.2 s)" in text
     assert "peak_tension (mean) design-1 is worse than the present design, and neither" in text
     assert "deployment_time <= 1.6 by 0.3 s (design-1 itself by 0.2 s)" in text
+    assert "with one variable as at present" not in text
+    front.attrs["designs"] -= 2
+    text = "\n".join(line for table in front_tables(front) for line in table.lines())
+    assert f"tried {front.sizes['tried'] - 2} designs with" in text
+    assert "; 2 further designs with one variable as at present" in text
     front["check_beyond"][:] = [[-0.5], [-0.2]]
     text = "\n".join(line for table in front_tables(front) for line in table.lines())
     assert "keeps to all constraints: keep that one" in text

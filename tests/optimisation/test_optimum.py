@@ -93,6 +93,25 @@ def test_chance_constraint_is_met_and_costs_little_more_than_it_must():
     assert best - 0.02 < np.median(costs) < 1.08 * most
 
 
+def test_designs_that_show_what_a_variable_buys_are_none_of_the_search():
+    """Each is the chosen design but for the variable that it names, which is as at present."""
+    going, told, asked = course(problem({"y": WANTED})), None, []
+    try:
+        while True:
+            asked.append(going.send(told))
+            told = gaussian(0)(asked[-1])
+    except StopIteration as end:
+        found = end.value
+    without = [one for one in asked if one.without is not None]
+    assert [one.without for one in without] == [(0, 0), (0, 1)]
+    runs = sum(one.samples == SEARCH for one in asked)
+    assert (len(found.points), found.searched) == (runs, runs - 2)
+    chosen = found.points[found.chosen[0].place]
+    for one in without:
+        here = np.arange(2) == one.without[1]
+        np.testing.assert_array_equal(one.point, np.where(here, 0.3, chosen))
+
+
 def test_quantile_that_no_normal_law_has_is_found_by_checking():
     """A lognormal y lies beyond its normal quantile: the first search breaks the bound."""
     wanted, met = Requirement(max=1.5, probability=0.95, confidence=0.9), 0

@@ -53,6 +53,11 @@ def test_loads_are_told_by_how_far_they_stay_below_their_limits() -> None:
         "largest tension: margin +0.333 (limit / value - 1) to limits.tension = 40 N",
     ]
     assert not list(below_limits(load_scene("ring18-cable"), values))
+    of_slack = load_scene("ring18-cable").with_values({"limits.slack_duration": 30.0})
+    (slack,) = below_limits(of_slack, values | {"longest_slack": np.array(8.0)})
+    assert slack == (
+        "longest slack: margin +2.75 (limit / value - 1) to limits.slack_duration = 30 s"
+    )
     values["peak_tension"] = np.array(41.0)  # its outcome is "overloaded", and says so
     (stress,) = below_limits(scene, values)
     assert "stress" in stress

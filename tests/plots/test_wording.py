@@ -8,6 +8,7 @@ import xarray as xr
 from loops import for_each
 from matplotlib.figure import Figure
 
+from ringsim.analysis.derived import Derived
 from ringsim.plots import style
 
 pytestmark = pytest.mark.quick
@@ -84,3 +85,10 @@ def test_a_run_that_does_not_tell_its_outcome_gives_the_reason(unfinished):
 ])  # fmt: skip
 def test_titles_tell_the_true_number_of_sections(title, wanted, unfinished):
     assert style.scene_title(unfinished.assign_attrs(title=title)) == wanted
+
+
+def test_an_output_by_an_expression_has_its_name_and_the_expression_as_it_is_written():
+    made = Derived(of="max(abs(asynchrony))").variable("apart")
+    drawn = xr.DataArray(0.0, name="apart", attrs={"long_name": made.long_name, "units": "degree"})
+    assert style.label(drawn) == "apart = max(abs(asynchrony)) (deg)"
+    assert style.label(drawn.assign_attrs(long_name="largest lag")) == "Largest lag (deg)"

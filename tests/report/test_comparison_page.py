@@ -12,12 +12,15 @@ import xarray as xr
 from click.testing import CliRunner
 from loops import for_each
 from made_campaign import TIMES, made_campaign, made_scene
+from matplotlib.text import Text
 
 from read_page import Page
 from ringsim.analysis.comparison import compare
 from ringsim.analysis.comparison_text import compared, names_of, sections
 from ringsim.analysis.design import median_and_worst
 from ringsim.analysis.intervals import good
+from ringsim.analysis.study import analyse
+from ringsim.analysis.verdicts import verdict_table
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots.comparison import figures_of_both, pairs, values
@@ -54,6 +57,37 @@ def test_the_page_holds_every_cell_of_the_terminal_and_loads_nothing(
     assert "Soft &lt;rods&gt; (flight)" in text
     order = [text.index(f'id="{name}"') for name in ("requirements", "outputs", "figures")]
     assert order == sorted(order)
+
+
+def test_what_may_be_off_is_told_with_verdicts_and_figures(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    """In the words of an analysis of each, and with its mark in the figures."""
+    one, other = (
+        each.assign(reason=("sample", np.array([REASON] * 8, dtype=object))) for each in both
+    )
+    found = compare(one, other)
+    for side, each in enumerate((one, other)):
+        words = {row[0]: row[3] for row in verdict_table(analyse(each)).rows}
+        texts = found["requirement"].values
+        assert found["kept_verdict_text"].values[:, side].tolist() == [words[t] for t in texts]
+    (table, *_) = sections(found)["requirements"].tables
+    told = {row[0]: row[-2:] for row in table.rows}
+    assert "if its numbers hold: may be off in 8 of 8" in told["asynchrony_max <= 3 deg ?"][0]
+    marked = {
+        text.get_text()
+        for _, _, figure in figures_of_both(found, one, other) for text in figure.findobj(Text)
+        if text.get_text().endswith(" ?")
+    }  # fmt: skip
+    assert marked
+    assert all(text.startswith(("Largest asynchrony", "Largest difference")) for text in marked)
+
+
+REASON = (
+    "all V-joints have reached 180 deg; steps of 50 ms at the lock at 5 s are too long for shocks "
+    "in the rods (period 80 ms), so asynchrony_max may be off: set solver.tolerance = 1e-04 "
+    "(2 to 3 times the steps)"
+)
 
 
 def test_what_differs_in_the_scenes_is_told_by_path(both: tuple[xr.Dataset, xr.Dataset]) -> None:

@@ -204,6 +204,14 @@ def test_changed_distribution_is_told_with_its_input(tmp_path: Path) -> None:
         ("solver.end_time=0,5", 'solver.end_time = "0,5" must be a finite number in s, without '
          "quotes: write 0.5"),
         ("solver.end_time=3s", "without quotes: write 3"),
+        ("solver.end_time=0.5h", "must be a finite number in s, without quotes: write 1800"),
+        ("limits.rod_stress=100MPa", "in Pa, without quotes: write 1e+08"),
+        ("limits.tension=0.2kN", "in N, without quotes: write 200"),
+        ("structure.half_bar=1028.7 mm", "in m, without quotes: write 1.0287"),
+        ("structure.opening_angle=0.35 rad", "in deg, without quotes: write 20.0535"),
+        ("structure.opening_angle=20 degrees", "in deg, without quotes: write 20"),
+        ("structure.half_bar=3 kg", "in m, without quotes: write the number alone"),
+        ("gravity=9.81", "must be a table: write gravity = { vector = [..., ..., ...] }"),
         ("solver.end_time=long", 'solver.end_time = "long" must be a finite number in s, without '),
         ("structure.closed=True", 'structure.closed = "True" must be true or false, without '
          "quotes: write true"),
@@ -230,6 +238,12 @@ def test_plausible_assignments_are_told_what_they_mean(assignment: str, named: s
         ('"loads.force" = 0.02', "inputs.loads.force = 0.02 must be a table"),
         ('"force" = { kind = "uniform", low = 0.01, high = 0.02 }', "or loads.force?"),
         ("[set]\nworkers = 2", "workers is not a known key"),
+        ('"loads.force" = { kind = "normal", mean = 0.01, sigma = 0.001 }',
+         "standard_deviation); also missing: inputs.loads.force.standard_deviation"),
+        ('"loads.force" = { kind = uniform, low = 0.01 }', 'correct that line, "loads.force" = {'),
+        ("[requirements]\nasynchrony_max <= 12", "asynchrony_max <= 12: write asynchrony_max = "
+         "{ max = 12, probability = ..., confidence = ... }"),
+        ("[set]\nboom = none", 'boom = none: words need quotes: write boom = "none"'),
     ],
 )  # fmt: skip
 def test_plausible_campaigns_are_told_what_is_missing(
@@ -243,6 +257,10 @@ def test_plausible_campaigns_are_told_what_is_missing(
 
 def test_keys_that_belong_elsewhere_in_a_campaign_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
+    path.write_text(CAMPAIGN.replace("samples = 4", "sample = 4"))
+    assert refused("campaign", path).endswith(
+        "design.sample is not a known key (did you mean samples?)"
+    )
     for line, named in (("samples = 4", "did you mean design.samples?"),
                         ("workers = 2", "ringsim campaign FILE --workers N")):  # fmt: skip
         path.write_text(f"{line}\n{CAMPAIGN}")
@@ -341,21 +359,25 @@ def test_a_scene_file_that_is_misspelt_is_suggested_before_a_built_in_scene(tmp_
 def test_refusals_of_campaigns_tell_the_cure(tmp_path: Path) -> None:
     """A normal friction goes below zero; percents are no probabilities."""
     path = tmp_path / "mine.toml"
-    law = '{ kind = "normal", mean = -0.02, standard_deviation = 0.002 }'
+    law = '{ kind = "normal", mean = 1e-6, standard_deviation = 0.002 }'
     path.write_text(f'{CAMPAIGN}"joints.vjoint.coulomb" = {law}\n')
     line = refused("campaign", path, "--dry-run")
     assert re.search(r"joints\.vjoint\.coulomb = -0\.\d{1,11} N m must be at least 0 N m: ", line)
     assert line.endswith('draw it with kind = "truncated", low = 0, of = { kind = "normal", ... }')
     # What another value of the scene bounds no end of a distribution cures.
-    wide = law.replace("-0.02", "0.02")
+    wide = law.replace("1e-6", "0.02")
     path.write_text(f'{CAMPAIGN}"rods.diagonal.inner_diameter" = {wide}\n')
     line = refused("campaign", path, "--dry-run")
     assert "must be below outer_diameter" in line
     assert "truncated" not in line
-    steep = law.replace("-0.02", "179.95")
-    path.write_text(f'{CAMPAIGN}"structure.opening_angle" = {steep}\n')
+    soft = law.replace("1e-6", "0.49999")
+    path.write_text(f'seed = 5\n{CAMPAIGN}"rods.poisson_ratio" = {soft}\n')
     line = refused("campaign", path, "--dry-run")
-    assert 'draw it with kind = "truncated", high = 179.9, of =' in line
+    assert 'draw it with kind = "truncated", high = 0.5, of =' in line
+    wrong = law.replace("1e-6", "120.0")
+    path.write_text(f'{CAMPAIGN}"rods.young_modulus" = {wrong}\n')
+    line = refused("campaign", path, "--dry-run")
+    assert line.endswith("and most of its distribution is not: check its numbers (1 GPa is 1e9 Pa)")
     wanted = "[requirements]\nasynchrony_max = { max = 9.0, probability = 95, confidence = 0.9 }"
     path.write_text(f"{CAMPAIGN}\n{wanted}\n")
     line = refused("campaign", path, "--dry-run")

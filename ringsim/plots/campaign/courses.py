@@ -93,7 +93,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
             axes.plot(case["time"], case.sel(plane=plane, section=sections[number]), **look)
         if not cases:
             ends = own.sel(quantile=0.0), own.sel(quantile=1.0)
-            axes.fill_between(own["time"], *ends, facecolor=(colour, 0.15), linewidth=0.5,
+            axes.fill_between(own["time"], *ends, facecolor=(colour, _BAND), linewidth=0.5,
                               edgecolor=colour)  # fmt: skip
         if line is not None and not cases:
             axes.plot(line["time"], line.sel(plane=plane, section=sections[number]), color=colour,
@@ -110,7 +110,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
             axes.set_xlabel(style.label(found["time"], width=24), fontsize=8)
     figure.supylabel(style.label(found, width=26), fontsize=10)
     words: list[Line2D | Patch] = [
-        Patch(facecolor=(style.GREY, 0.15), edgecolor=style.GREY, linewidth=0.5,
+        Patch(facecolor=(style.GREY, _BAND), edgecolor=style.GREY, linewidth=0.5,
               label="all samples"),
     ]  # fmt: skip
     if line is not None:
@@ -132,16 +132,18 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     return figure
 
 
+_BAND = 0.2
+"""How far bands cover what is behind them."""
 _WHOLE = 1.3
 """Height of the row that has the whole run, inch."""
-_LITTLE, _SHORT, _AROUND = 0.1, 0.5, 0.15
+_LITTLE, _SHORT, _AROUND = 0.25, 0.5, 0.15
 """Share of the largest deviation that is little; share of the time below which what happens is
 enlarged, and what of its length is drawn before and behind it."""
 
 
 def _eventful(found: xr.DataArray) -> tuple[float, float]:
     """Begin and end (s) of the time in which any V-joint of any sample deviates by more than a
-    tenth of the largest; the whole time where that is more than half of it.
+    quarter of the largest; the whole time where that is more than half of it.
     """
     time, size = found["time"].to_numpy(), abs(found).max(("quantile", "plane", "section"))
     far = time[size.to_numpy() > _LITTLE * float(size.max())]

@@ -70,7 +70,7 @@ def counted(campaign: xr.Dataset, words: NDArray[np.str_], lines: str = "lines a
     """How many samples hold, how many of them are drawn, and what bands and lines are."""
     count = int(good(campaign).sum())
     drawn = "" if len(words) == count else f" {len(words)} of them are drawn."
-    lines = f" Bands span the samples of an ending{'; ' * bool(lines)}{lines}."
+    lines = f" Bands span the samples of an outcome{'; ' * bool(lines)}{lines}."
     if of_cases(campaign):
         lines = lines_told(campaign)
     return f"{told(campaign, count)}.{drawn}{lines}"
@@ -78,7 +78,7 @@ def counted(campaign: xr.Dataset, words: NDArray[np.str_], lines: str = "lines a
 
 def over_time_told(campaign: xr.Dataset, words: NDArray[np.str_]) -> str:
     """The same of courses over time, which a sample of each ending stands for."""
-    line = f"the line is {middle_told(campaign, 'that ending')}"
+    line = f"the line is {middle_told(campaign, 'that outcome')}"
     return counted(campaign, words, line * bool(judged_by(campaign)))
 
 
@@ -141,7 +141,7 @@ _WORDS = {"base_force": "force at the base", "base_torque": "torque at the base"
 
 
 @picture(
-    "campaign", 120, "Force and torque at the base over time, by ending",
+    "campaign", 120, "Force and torque at the base over time, by outcome",
     ("base_force", "base_torque"), name="base",
 )  # fmt: skip
 def base_load(campaign: xr.Dataset) -> Figure:
@@ -169,7 +169,7 @@ _ANGLES = 161
 
 
 @picture(
-    "campaign", 40, "Smallest margin of the drive by ending, and its course",
+    "campaign", 40, "Smallest margin of the drive by outcome, and its course",
     ("drive_margin", "least_drive_margin", "opening_angle"),
 )  # fmt: skip
 def margin(campaign: xr.Dataset) -> Figure:
@@ -255,7 +255,7 @@ def laid_on(grid: Array, angle: Array, margins: Array) -> Array:
 
 
 @picture(
-    "campaign", 110, "Torque and speed of the motors over time, by ending",
+    "campaign", 110, "Torque and speed of the motors over time, by outcome",
     ("motor_torque", "motor_speed"),
 )  # fmt: skip
 def motors(campaign: xr.Dataset) -> Figure:

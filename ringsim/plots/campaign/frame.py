@@ -83,7 +83,7 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
         subject += MARK
         caption += f"\n{MARK.strip()} {note[0].upper()}{note[1:]}."
     (marked, *_) = doubted(Table((), (), [caption]), says).notes
-    if _mark_panels(figure, off_counts(says)) or marked != caption:
+    if mark_panels(figure, off_counts(says)) or marked != caption:
         caption = f"{marked}\n{off_note(says)}."
     held = caption.replace(" %", f"{style.FIXED}%")
     words = "\n".join(textwrap.fill(each, int(12.0 * inches)) for each in held.split("\n"))
@@ -100,7 +100,7 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
         figure.supxlabel(words, x=0.012, ha="left", fontsize=9, color=style.GREY)
 
 
-def _mark_panels(figure: Figure, names: Collection[str]) -> bool:
+def mark_panels(figure: Figure, names: Collection[str]) -> bool:
     """Mark panels and axes that are of outputs which may be off; whether there are any."""
     both = [(VARIABLES[n], VARIABLES.get(VARIABLES[n].largest_of or VARIABLES[n].least_of))
             for n in names]  # fmt: skip

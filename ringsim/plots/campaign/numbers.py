@@ -292,7 +292,7 @@ def _size(text: str) -> tuple[float, str]:
 @picture(
     "campaign",
     80,
-    "The main number of each sample and how it ended, by each drawn input",
+    "The main number of each sample and its outcome, by each drawn input",
     applies=_has_run,
 )
 def by_input(campaign: xr.Dataset) -> Figure:

@@ -1,6 +1,7 @@
 """Which inputs matter for the main numbers: tornado, and single changes."""
 
 import itertools
+import textwrap
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -250,7 +251,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
         unit = unit_behind("", units) if bars.measure == "mean_absolute_effect" else ""
         below = f"\n{bars.told}" if bars.told and bars.told != shared else ""
         if bars.names:
-            axes.set_xlabel(f"{MEASURES[bars.measure]}{unit}{_beside(bars)}{below}", fontsize=9)
+            words = textwrap.fill(f"{MEASURES[bars.measure]}{unit}{_beside(bars)}", _LABEL)
+            axes.set_xlabel(f"{words}{below}", fontsize=9)
     if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
         legend(figure, panels)
     whiskers = "Whiskers: 95 % intervals." if certain else ""
@@ -273,6 +275,10 @@ def tornado(campaign: xr.Dataset) -> Figure:
         caption += f" Not drawn for want of room: {', '.join(others)}."
     head(figure, campaign, "What matters", caption + unmoved)
     return figure
+
+
+_LABEL = 48
+"""Characters of a line below a panel's axis."""
 
 
 def _beside(bars: Bars) -> str:
