@@ -6,7 +6,7 @@ import pytest
 from ring_runs import Run, ring, run
 
 
-@pytest.fixture(scope="module", params=["frame", pytest.param("full", marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=["frame", "full"])
 def engine(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
