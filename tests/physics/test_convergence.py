@@ -86,7 +86,6 @@ def test_refining_ancf_rods() -> None:
     assert refined("ancf", 120e9, (1, 2, 4)).max() < math.radians(0.004)
 
 
-@pytest.mark.slow  # tests/cable_engine/test_slope_blocks.py: in a truss whose rope is cut
 def test_formulations_agree() -> None:
     """Shear-deformable beams with quaternions against slope vectors: same deployment time."""
     # Two elements: one ANCF element is stiffer, which shows in the fifth digit (4e-6 with two).
