@@ -293,7 +293,12 @@ def modes(found: xr.Dataset) -> Figure:
     scene = scene_from_toml(str(found.attrs["scene"]), source="attribute scene")
     count = min(_SHAPES, found.sizes["mode"])
     figure = Figure(figsize=(10.2, 6.3))
-    grid = figure.add_gridspec(2, count, height_ratios=(1.0, 0.62))
+    # By hand: panels of equal scales leave matplotlib's layout no height for the others.
+    figure.set_layout_engine("none")
+    grid = figure.add_gridspec(
+        2, count, height_ratios=(1.0, 0.62),
+        left=0.07, right=0.98, bottom=0.05, top=0.86, hspace=0.48, wspace=0.15,
+    )  # fmt: skip
     axes = figure.add_subplot(grid[0, :])
     colours = style.section_colours(found.sizes["mode"])
     latched = found["latched"].values == 1
@@ -318,7 +323,8 @@ def modes(found: xr.Dataset) -> Figure:
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel(style.label(found["angle"]))
     axes.set_ylabel("Natural frequency (Hz)")
-    axes.legend(loc="upper left", ncols=2)
+    named = len(axes.get_legend_handles_labels()[1])
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(named, 9), fontsize=8)
     last, azimuth = found.isel(angle=-1), facing_azimuth(scene)
     points = points_of(layout_of(scene), scene.structure.planes)
     rest = last["position"].transpose("point", "axis").values

@@ -13,6 +13,7 @@ from loops import for_each
 
 import ringsim
 from ringsim.cli import cli
+from ringsim.plots.ring import modes as drawn
 from ringsim.refusal import InputError
 from ringsim.vibration import angles_of, modes_tables
 
@@ -160,6 +161,9 @@ def test_the_verb_prints_writes_and_draws(tmp_path: Path) -> None:
     largest = np.linalg.norm(found["shape"], axis=-1).max(axis=-1)
     assert largest == pytest.approx(np.ones((2, 3)))
     assert (tmp_path / "four-fig-modes.png").stat().st_size > 10_000
+    curves, *shapes = drawn(found).axes
+    assert curves.get_position().height > 0.35
+    assert all(panel.get_position().height > 0.15 for panel in shapes)
     again = CliRunner().invoke(cli, ["plot", str(file), "--plot-format", "svg"])
     assert again.exit_code == 0
     assert (tmp_path / "four-fig-modes.svg").exists()
