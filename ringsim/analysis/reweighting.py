@@ -40,7 +40,13 @@ from ringsim.choice import kind_of
 from ringsim.files import parse_toml
 from ringsim.overrides import parse_value
 from ringsim.refusal import InputError, explain, known_or_nearest, show
-from ringsim.sampling.distributions import Discrete, Distribution, Values, inside
+from ringsim.sampling.distributions import (
+    Calibrated,
+    Discrete,
+    Distribution,
+    Values,
+    inside,
+)
 from ringsim.sampling.table import AnyDistribution
 from ringsim.stepping.instant import Array
 from ringsim.units import Model
@@ -369,6 +375,12 @@ def _drawn_from(campaign: xr.Dataset, path: str, variable: xr.DataArray) -> Dist
             f"--reweight {path}: this input has no distribution in the file (its values were "
             "listed): draw it from a distribution"
         ) from None
+    if isinstance(old, Calibrated):
+        raise InputError(
+            f"--reweight {path}: it was learnt from a test, whose readings tie it to the other "
+            "inputs, and a new distribution of one input alone would not keep that: run a new "
+            "campaign"
+        )
     text = parse_toml(str(campaign.attrs.get("campaign", "")), "campaign")
     for pair in text.get("correlations", []):
         if path in (names := pair.get("between", [])):

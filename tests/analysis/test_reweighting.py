@@ -275,16 +275,19 @@ def test_words_and_lists_of_places_have_weights():
         ({"word": {"kind": "discrete", "values": ["a", "c"]}}, '"c" was never drawn'),
         ({"listed": NARROW}, "has no distribution"),
         ({"pair": NARROW}, "correlated with x1"),
+        ({"learnt": NARROW}, "was learnt from a test"),
     ],
 )
 def test_what_samples_do_not_cover_is_refused(reweighted, words):
     made = drawn_campaign(RandomDesign(samples=100), linear, 2, 1)
     law = {"kind": "normal", "mean": 0.0, "standard_deviation": 1.0}
+    learnt = {"kind": "calibrated", "of": law, "shift": 0.5, "remaining_scatter": 0.1}
     for path, values, words_of in (
         ("tail", norm.ppf(made.x1), json.dumps(law)),
         ("word", np.full(100, "a", dtype=object), '{"kind": "discrete", "values": ["a", "b"]}'),
         ("listed", made.x1.values, "listed in a file"),
         ("pair", made.x1.values, UNIT),
+        ("learnt", made.x1.values, json.dumps(learnt)),
     ):
         made[path] = "sample", values, {"role": "input", "path": path, "distribution": words_of}
     made.attrs["campaign"] = '[[correlations]]\nbetween = ["x1", "pair"]\ncoefficient = 0.5\n'
