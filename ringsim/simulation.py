@@ -177,7 +177,11 @@ def _run(
     if scene.record.frequency and outcome.fate is Fate.DEPLOYED:
         from ringsim.frame.modes import first_frequency  # few scenes ask for it
 
-        outcome.values["first_frequency"] = np.array(first_frequency(scene))
+        try:
+            outcome.values["first_frequency"] = np.array(first_frequency(scene))
+        except InputError as error:  # the run itself is as good as without
+            outcome.values["first_frequency"] = np.array(np.nan)
+            outcome = replace(outcome, reason=f"{outcome.reason}; first_frequency unknown: {error}")
     return _with_remark(with_margin(outcome, scene, before), scene)
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 from ringsim import build
 from ringsim.choice import kind_of
 from ringsim.frame.modes import PARTS, Modes, Standing
-from ringsim.refusal import InputError, known_or_nearest
+from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.structures.pantograph_ring import LEAST_OPENING
 from ringsim.tables import Table, counted
@@ -101,7 +101,7 @@ def angles_of(scene: Scene, at: Sequence[float | str] | None, points: int) -> li
         except ValueError:
             raise InputError(
                 f"at = {each!r} is no opening angle: give degrees from {LEAST_OPENING:g} to 180, "
-                f"or one of {', '.join(_WORDS)} ({known_or_nearest(str(each), _WORDS)})"
+                f"or one of {', '.join(_WORDS)}"
             ) from None
         if not angle >= LEAST_OPENING:
             raise InputError(f"at = {angle:g} deg must be at least {LEAST_OPENING:g} deg: angles "

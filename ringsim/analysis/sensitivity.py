@@ -464,6 +464,15 @@ def ratio_of(
     return found, list(zip(np.maximum(0.0, low).tolist(), high.tolist(), strict=True))
 
 
+def enough_weight(own: Mask, weights: Array) -> bool:
+    # Two weights have exact intervals; others, with fewer effective samples, held in 9 of 14.
+    fewest = float(min(own.sum(), len(own) - own.sum()))
+    if fewest < LEAST_OF_SHARE or not np.ptp(weights) > 0.0:  # alike if no sample has a word
+        return False
+    two = len(np.unique(weights.round(9))) == 2
+    return two or decisive_of_share(own, weights) >= min(25.0, 0.7 * fewest)
+
+
 def rarer(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement,
     step: float = STEP,
@@ -473,8 +482,8 @@ def rarer(
     ``change_listed`` where chance among all changes does not explain it; ``change_input``,
     ``change_of`` and ``change_values`` say what is changed, and ``change_untold`` what is not told.
 
-    Only samples whose numbers hold count.  NaN below 10 samples, effective ones with the weights
-    among them, that violate or that do not.  Empty without a requirement, and where the design
+    Only samples whose numbers hold count.  NaN below 10 samples that violate or that do not, and
+    where few of them have most of the weight.  Empty without a requirement, and where the design
     stands for no population.
     """
     if not requirements or not placed.population:
@@ -498,12 +507,10 @@ def rarer(
         logarithm = log_ratio(*each.laws, campaign[each.variable].to_numpy()[held])
         weights = np.exp(np.minimum(logarithm, 700.0))
         for k, own in enumerate(broken):
-            # No number here exceeds a missing one; all are alike if no sample has a word.
-            if not (decisive_of_share(own, weights) >= LEAST_OF_SHARE and np.ptp(weights) > 0.0):
+            if not enough_weight(own, weights):
                 continue
-            ratio, (ends, wide) = ratio_of(
-                own, weights, replicate, [1.0 - LEVEL, chance], sobol=placed.kind in SOBOL
-            )
+            levels, sobol = [1.0 - LEVEL, chance], placed.kind in SOBOL
+            ratio, (ends, wide) = ratio_of(own, weights, replicate, levels, sobol=sobol)
             told[k, n] = ratio, *ends
             # The scatter among all samples, since few violations may be alike by chance; of the
             # logarithm, which has the shorter tails.
@@ -515,19 +522,16 @@ def rarer(
     why = "; ".join(f"{', '.join(names)} ({each})" for each, names in left.items())
     untold = np.array(why, dtype=object)  # so that files take it as text
     says = "input whose distribution is another", "what of it", "as drawn, and as it would be"
+    columns = [np.array([each[k] for each in found], dtype=object) for k in range(3)]
     texts = {
-        f"change_{Change._fields[k]}": (
-            "change", np.array([each[k] for each in found], dtype=object), {"long_name": says[k]}
-        )
+        f"change_{Change._fields[k]}": ("change", columns[k], {"long_name": says[k]})
         for k in range(3)
-    }  # fmt: skip
-    dims = ("requirement", "change")
+    }
+    dims, bars = ("requirement", "change"), about(f"95 % interval of the {words}")
     return xr.Dataset(
         texts | {
             "change_ratio": (dims, told[..., 0], about(words)),
-            "change_ratio_interval": (
-                (*dims, "bound"), told[..., 1:], about(f"95 % interval of the {words}"),
-            ),
+            "change_ratio_interval": ((*dims, "bound"), told[..., 1:], bars),
             "change_listed": (dims, listed, about("whether chance does not explain it")),
             "change_untold": ((), untold, {"long_name": "what is not tried, and why"}),
         },
@@ -537,11 +541,11 @@ def rarer(
 
 def rarer_table(analysis: xr.Dataset) -> Table:
     """What would make violations of requirements rarer, or more frequent, the largest change first;
-    in notes requirements of which no input, or too few samples, tell.
+    in notes requirements of which nothing is told.
     """
     if "change_ratio" not in analysis:
         return Table((), ())
-    rows, quiet, few, more = list[tuple[str, ...]](), list[str](), list[str](), list[str]()
+    rows, quiet, few, more, unequal = (list[Any]() for _ in range(5))
     names = [analysis[f"change_{word}"].values.tolist() for word in ("input", "of", "values")]
     which = [*zip(*names, strict=True)]
     for name in analysis["requirement"].values.tolist():
@@ -557,7 +561,9 @@ def rarer_table(analysis: xr.Dataset) -> Table:
             best.setdefault(which[k][:2], k)
         kept = [k for k in best.values() if one["change_listed"].values[k]]
         kept.sort(key=lambda k: -abs(ratio[k] - 1.0))
-        quiet += [name] * (not kept)
+        missing = int(np.isnan(ratio).sum())
+        quiet += [name] * (not kept and not 0 < missing == len(ratio))
+        unequal += [f"{name} ({missing} of {len(ratio)} changes)"] * bool(missing)
         if len(kept) > _MOST_CHANGES:
             more.append(f"{name} {len(kept) - _MOST_CHANGES}")
         for n, k in enumerate(kept[:_MOST_CHANGES]):
@@ -580,15 +586,13 @@ def rarer_table(analysis: xr.Dataset) -> Table:
         )
     notes += [f"further significant changes: {', '.join(more)}"] * bool(more)
     if quiet and which:
-        notes.append(
-            "no significant change, by any one distribution, of the probability of violating "
-            f"{', '.join(quiet)}"
-        )
-    if few:
-        notes.append(
-            f"too few samples to tell what would make violations rarer ({LEAST_OF_SHARE:g} that "
-            f"violate and as many that do not are needed): {', '.join(few)}"
-        )
+        what = "no significant change, by any one distribution, of the probability of violating"
+        notes.append(f"{what} {', '.join(quiet)}")
+    why = "not told, since few samples would have most of the weight"
+    notes += [f"{why}: {', '.join(unequal)}"] * bool(unequal)
+    needs = f"{LEAST_OF_SHARE:g} that violate and as many that do not are needed"
+    why = f"too few samples to tell what would make violations rarer ({needs})"
+    notes += [f"{why}: {', '.join(few)}"] * bool(few)
     untold = analysis["change_untold"].item()
     notes += [f"not tried: {untold}"] * bool(untold and (rows or quiet))
     head = ("what changes a probability", "input", "its", "from -> to", "probability", "change",

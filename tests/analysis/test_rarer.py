@@ -274,6 +274,30 @@ def test_failed_runs_and_others_that_have_not_run_do_not_count():
     assert np.isfinite(found.change_ratio).all()
 
 
+def test_a_cut_that_removes_all_violations_is_the_first_to_be_told():
+    """Of a uniform input only the ends are bad: 10 % less of its range leaves none of them."""
+    laws = {"u": {"kind": "uniform", "low": 0.0, "high": 1.0}}
+    one = made(RandomDesign(samples=1000), 3, laws, lambda x: np.abs(x["u"] - 0.5))
+    found = analyse(one, limited(0.462))
+    assert found.change_ratio.values.ravel() == pytest.approx([0.0])
+    assert found.change_ratio_interval.values.ravel()[1] < 0.2
+    assert found.change_listed.values.ravel().tolist() == [1]
+    assert any("-100 %" in line for line in told(found))
+
+
+def test_what_few_samples_would_decide_is_not_called_insignificant():
+    """Narrower normal inputs at 400 places give nearly all weight to few samples."""
+    laws = {"friction": NORMAL | {"each_section": True}}
+    rng = np.random.default_rng(5)
+    x = 3.0 + 0.5 * rng.standard_normal((300, 400))
+    one = campaign(x.sum(axis=1), design=json.loads(RandomDesign(samples=300).model_dump_json()))
+    says = {"role": "input", "path": "friction", "distribution": json.dumps(laws["friction"])}
+    one["friction"] = ("sample", "section"), x, says
+    most = float(np.quantile(x.sum(axis=1), 0.9))
+    lines = told(analyse(one, limited(most)))
+    assert any("few samples would have most of the weight: asynchrony_max" in one for one in lines)
+
+
 def test_designs_that_cannot_tell():
     few = made(Sobol(samples=512, replicates=8), 1, SUM, of_sum)
     assert any("needs design.replicates = 16" in line for line in told(analyse(few, limited(17.8))))

@@ -13,6 +13,7 @@ from loops import for_each
 
 import ringsim
 from ringsim.cli import cli
+from ringsim.parts.rods import LengthError
 from ringsim.plots.ring import modes as drawn
 from ringsim.refusal import InputError
 from ringsim.vibration import angles_of, modes_tables
@@ -141,6 +142,44 @@ def test_gravity_is_that_of_the_scene() -> None:
     still = float(ringsim.modes(held, ["deployed"], count=1)["frequency"][0, 0])
     assert min(each) < still < max(each)
     assert np.mean(each) == pytest.approx(still, rel=1e-3)
+
+
+@pytest.mark.parametrize(("pull", "first"), [(-4.0, 0.48992), (-9.81, 0.49311)])
+def test_a_ring_that_its_weight_bends_much_finds_its_balance(pull: float, first: float) -> None:
+    """Whole Newton steps lead away; smaller ones of any size lead to one state."""
+    held = {"boom.base": "fixed", "net": "none", "gravity.vector": [0.0, 0.0, pull]}
+    found = ringsim.modes(ringsim.load_scene("ring18").with_values(held), ["deployed"], count=3)
+    assert float(found["frequency"][0, 0]) == pytest.approx(first, rel=1e-4)
+
+
+@pytest.mark.parametrize("sections", [1, 3])
+def test_arcs_without_a_boom_have_the_same_modes_however_many_are_asked_for(sections: int) -> None:
+    arc = {"net": "none", "boom": "none", "structure.closed": False, "structure.sections": sections}
+    scene = ringsim.load_scene("ring18").with_values(arc)
+    few, many = (ringsim.modes(scene, [60.0, "deployed"], count=n) for n in (3, 6))
+    assert few["frequency"].values == pytest.approx(many["frequency"].values[:, :3], rel=1e-5)
+
+
+def test_errors_of_all_rods_at_once_leave_a_frequency() -> None:
+    """As large as those that ship, where rods cannot be put together next to 180 deg."""
+    rng = np.random.default_rng(1)
+    plain = ringsim.load_scene("ring18")
+    kinds = LengthError.model_fields
+    errors = {f"rods.length_error.{k}": (2e-4 * rng.standard_normal(18)).tolist() for k in kinds}
+    both = (plain, plain.with_values(errors))
+    found = [float(ringsim.modes(s, ["deployed"], count=1)["frequency"][0, 0]) for s in both]
+    assert found[1] == pytest.approx(found[0], rel=1e-3)
+
+
+def test_a_run_whose_frequency_is_not_found_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuses(scene: Any) -> float:
+        raise InputError("at 180 deg nothing balances")
+
+    monkeypatch.setattr("ringsim.frame.modes.first_frequency", refuses)
+    run = ringsim.simulate(RING.with_values({"record.frequency": True}))
+    assert np.isnan(run["first_frequency"])
+    assert float(run["deployment_time"]) > 0.0
+    assert "; first_frequency unknown: at 180 deg nothing balances" in run.attrs["reason"]
 
 
 def test_the_verb_prints_writes_and_draws(tmp_path: Path) -> None:

@@ -175,7 +175,7 @@ def test_shapes_have_the_frequency_of_their_forces(
     """
     scene = load_scene(name).with_values({"structure.sections": 6, "loads": "none"} | values)
     standing = Standing(scene, angle, latched=latched, tension=tension)
-    found, vectors = standing.lowest(16)
+    found, vectors = standing.lowest(16, 16)
     solid = np.flatnonzero(hertz(np.abs(found)) > 0.2)[:6]
     assert len(solid) == 6
     quotients = [rayleigh(standing, vectors[:, k]) for k in solid]
