@@ -465,7 +465,7 @@ def ratio_of(
 
 
 def enough_weight(own: Mask, weights: Array) -> bool:
-    # Two weights have exact intervals; others, with fewer effective samples, held in 9 of 14.
+    """Whether weights tell of ``own`` samples: intervals of fewer effective ones held in 9 of 14."""
     fewest = float(min(own.sum(), len(own) - own.sum()))
     if fewest < LEAST_OF_SHARE or not np.ptp(weights) > 0.0:  # alike if no sample has a word
         return False
