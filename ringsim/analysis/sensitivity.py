@@ -465,12 +465,12 @@ def ratio_of(
 
 
 def enough_weight(own: Mask, weights: Array) -> bool:
-    """Whether weights tell of ``own`` samples: intervals of fewer effective ones held in 9 of 14."""
+    """Whether weights tell of ``own``: with fewer effective ones intervals held in 9 of 14 cases."""
     fewest = float(min(own.sum(), len(own) - own.sum()))
-    if fewest < LEAST_OF_SHARE or not np.ptp(weights) > 0.0:  # alike if no sample has a word
+    values = len(np.unique(weights.round(9)))  # 1, that of all, if no sample has a word
+    if fewest < LEAST_OF_SHARE or values < 2:
         return False
-    two = len(np.unique(weights.round(9))) == 2
-    return two or decisive_of_share(own, weights) >= min(25.0, 0.7 * fewest)
+    return values == 2 or decisive_of_share(own, weights) >= min(25.0, 0.7 * fewest)
 
 
 def rarer(
