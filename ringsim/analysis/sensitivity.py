@@ -465,7 +465,7 @@ def ratio_of(
 
 
 def enough_weight(own: Mask, weights: Array) -> bool:
-    """Whether weights tell of ``own``: with fewer effective ones intervals held in 9 of 14."""
+    """Whether weights tell a change of ``own`` samples: below that 95 % held in 9 of 14 cases."""
     fewest = float(min(own.sum(), len(own) - own.sum()))
     values = len(np.unique(weights.round(9)))  # 1, that of all, if no sample has a word
     if fewest < LEAST_OF_SHARE or values < 2:

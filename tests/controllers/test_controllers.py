@@ -268,6 +268,7 @@ def test_engines_agree_on_a_controlled_run() -> None:
     frame, full = (ringsim.simulate(scene, fidelity=fidelity) for fidelity in ENGINES)
     assert full["opening_angle"].values == pytest.approx(frame["opening_angle"].values, abs=0.02)
     assert full["wound_length"].values == pytest.approx(frame["wound_length"].values, abs=2e-5)
+    assert full["winch_command"].values == pytest.approx(frame["winch_command"].values, rel=1e-3)
     for run in (frame, full):
         assert float(run["energy_error"]) < 1e-3
     rate = frame["wound_length"].diff("time") / frame["time"].diff("time")
