@@ -427,6 +427,19 @@ class _Course:
             _write(self)
 
 
+def first_order(given: Given) -> tuple[Order, int, int]:
+    """The verdict on the present design, which stands for all; about how many runs an optimisation
+    has (two checks by more samples for each design on the front, and one of the present: how many
+    rounds it takes nobody knows); and how many are checked by the other engine.
+    """
+    budget, chosen = given.budget, given.problem.front
+    every = given.present.specification.check_every
+    runs = (budget.designs + chosen * len(budget.variables)) * budget.samples
+    runs += (1 + 2 * chosen) * budget.check + (1 + chosen) * budget.verdict
+    checks = -(-budget.verdict // every) if every else 0
+    return Order(given.present, Path()), runs, (1 + chosen) * checks
+
+
 def run_optimisation(
     given: Callable[[], Given], workers: int | None, out: Path | None
 ) -> tuple[Ended, Path]:

@@ -133,6 +133,29 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     return [*lines, f"  predicted      about {in_words(float(whole))}{rest}"]
 
 
+def plan_of_course(
+    order: Order, runs: int, checks: int, workers: int, say: Callable[[str], None]
+) -> list[str]:
+    """What campaigns one after the other cost that are like an order, whose folder has no runs: so
+    many runs, and checks by the judging engine; arguments and lines as of ``plan``.
+    """
+    table = order.campaign.draw()
+    none, todo = survey(order.folder, [""] * table.samples), np.arange(table.samples)
+    each, (told,), size = _predicted(order, table, none, todo, lambda sample: sample, 0, say)
+    seconds = float(each.mean()) * runs
+    lines = [*map(extent_told, table.columns), f"  workers        {workers}"]
+    lines += [f"  cost           about {counted(runs, 'run')}, {told}"]
+    if checks:
+        own, (told,), _ = _predicted(order, table, none, todo, check_of, 0, say, float(each.mean()))
+        lines += [f"  checks         {checks} with the full engine, {told}"]
+        seconds += float(own.mean()) * checks
+    return [
+        *lines,
+        f"  disk           {size_text(size)} a run, {size_text(size * (runs + checks))} for all",
+        f"  predicted      about {in_words(seconds / workers)}, if nothing has run yet",
+    ]
+
+
 def _predicted(
     order: Order,
     table: Table,

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,10 @@ from ringsim.tables import Table, counted
 _WORKERS = click.option(
     "--workers", metavar="N", type=WORKERS, help="Solver processes (default: all cores)."
 )
+_DRY_RUN = click.option(
+    "--dry-run", is_flag=True,
+    help="Check the file, time one run, and show what all would cost; store nothing.",
+)  # fmt: skip
 
 
 @click.command()
@@ -239,10 +244,12 @@ def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float
 @SETTINGS
 @click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME).")
 @_WORKERS
+@_DRY_RUN
 @click.option("--plot", is_flag=True, help="Draw what was learnt beside posterior.nc.")
 def calibrate_command(
-    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None, *, plot: bool
-) -> int:
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None, *, dry_run: bool,
+    plot: bool,
+) -> int:  # fmt: skip
     """Find unknown inputs from measured data: FILE has priors, the data and a budget of runs.
 
     FILE is a campaign file without a design, with measured = "TEST.toml", runs and stages.  Writes
@@ -252,7 +259,9 @@ def calibrate_command(
     """
     from ringsim.analysis.posterior import calibration_tables
 
-    return _course(file, settings, out, workers, calibration_tables, planning=False, plot=plot)
+    return _course(
+        file, settings, out, workers, calibration_tables, planning=False, dry_run=dry_run, plot=plot
+    )
 
 
 @click.command()
@@ -260,8 +269,9 @@ def calibrate_command(
 @SETTINGS
 @click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME-sensors).")
 @_WORKERS
+@_DRY_RUN
 def sensors_command(
-    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None, *, dry_run: bool
 ) -> int:
     """Tell before a test how much each sensor would tell: FILE is as for calibrate.
 
@@ -271,7 +281,9 @@ def sensors_command(
     """
     from ringsim.analysis.posterior import sensors_table
 
-    return _course(file, settings, out, workers, lambda d: [sensors_table(d)], planning=True)
+    return _course(
+        file, settings, out, workers, lambda d: [sensors_table(d)], planning=True, dry_run=dry_run
+    )
 
 
 @click.command()
@@ -279,10 +291,12 @@ def sensors_command(
 @SETTINGS
 @click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME).")
 @_WORKERS
+@_DRY_RUN
 @click.option("--plot", is_flag=True, help="Draw the front beside front.nc.")
 def optimise_command(
-    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None, *, plot: bool
-) -> int:
+    file: Path, settings: dict[str, Any], out: Path | None, workers: int | None, *, dry_run: bool,
+    plot: bool,
+) -> int:  # fmt: skip
     """Find the values that make an antenna best under what is uncertain.
 
     FILE is a campaign file without a design, with variables, objectives and constraints.  Writes
@@ -291,7 +305,12 @@ def optimise_command(
     interrupted; under mpiexec or srun every rank computes, and --workers is left out.
     """
     from ringsim.analysis.front import front_tables
-    from ringsim.campaign.optimisation import Given, optimisation_of, run_optimisation
+    from ringsim.campaign.optimisation import (
+        Given,
+        first_order,
+        optimisation_of,
+        run_optimisation,
+    )
 
     def given() -> Given:
         found = optimisation_of(read_text(file), file, settings)
@@ -303,6 +322,8 @@ def optimise_command(
         )
         return found
 
+    if dry_run:
+        return _plan(lambda: first_order(given()), workers)
     ended, path = run_optimisation(given, _most(workers), out)
     return _told(ended, path, front_tables, plot=plot)
 
@@ -316,9 +337,10 @@ def _most(workers: int | None) -> int | None:
 
 def _course(
     file: Path, settings: dict[str, Any], out: Path | None, workers: int | None,
-    tables: Callable[[Any], list[Table]], *, planning: bool, plot: bool = False,
+    tables: Callable[[Any], list[Table]], *, planning: bool, dry_run: bool, plot: bool = False,
 ) -> int:  # fmt: skip
     from ringsim.campaign.calibration import Given, calibration_of, run_course
+    from ringsim.campaign.run import Order
 
     def given() -> Given:  # where stages are ordered: on the first rank
         found = calibration_of(read_text(file), file, settings)
@@ -329,8 +351,28 @@ def _course(
         )
         return found
 
+    if dry_run:
+
+        def first() -> tuple[Order, int, int]:
+            found = given()
+            return Order(found.campaign, Path()), found.members * found.budget.stages, 0
+
+        return _plan(first, workers)
     ended, path = run_course(given, _most(workers), out, planning=planning)
     return _told(ended, path, tables, plot=plot)
+
+
+def _plan(first: Callable[[], tuple[Any, int, int]], workers: int | None) -> int:
+    """Print what a course of campaigns would cost: an order that stands for all, and how many runs
+    and checks they have.
+    """
+    from ringsim.campaign.plan import plan_of_course
+
+    order, runs, checks = first()
+    cores = _most(workers) or launched_size()
+    for line in plan_of_course(order, runs, checks, cores, partial(click.echo, err=True)):
+        click.echo(line)
+    return EXIT_DONE
 
 
 def _told(

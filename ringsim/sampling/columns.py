@@ -40,7 +40,7 @@ class Column:
     """Second dimension of ``values``, or empty: "section", "corner", "pulley",
     "pulley_of_two_winches" (one more), or "place_k" for lists of any other length k."""
     units: str
-    """SI unit of the field."""
+    """Unit of the field, SI; of what has no path as it was told, or empty."""
     origin: str
     """The distribution, in words."""
     values: Values
@@ -124,7 +124,7 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
         variable = file.createVariable(column.name, kind, dims, **options)
         role = "input" if column.path or column.input else "label"
         variable.long_name = f"{role} {column.path or column.name}"
-        if column.has_numbers and column.path:  # nothing tells the unit of what others follow
+        if column.has_numbers and column.units:
             variable.units = column.units
         variable.setncatts(
             {"path": column.path, "role": role, "distribution": column.origin}

@@ -126,6 +126,8 @@ class Distribution(Model):
     """Draw one independent value for every section instead of one for all."""
     shared: Annotated[tuple[str, ...], ListIn] = ()
     """Scene paths that all take the value drawn; the key of the input is then only its name."""
+    unit: Annotated[str, Field(pattern=r"^\S(.{0,20}\S)?$")] | None = None
+    """Unit of an input that is no scene path, as others follow it: the scene knows the others'."""
 
     @property
     def follows(self) -> str:

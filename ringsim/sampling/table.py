@@ -19,6 +19,7 @@ from ringsim.sampling.designs.blocks import Grouped
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.distributions import Distribution, Values, extremes_of, is_label, plain
 from ringsim.scene import Scene
+from ringsim.tables import unit_text
 from ringsim.units import ListIn, Model, unit_at
 
 AnyDistribution = Annotated[Distribution, OneOf()]
@@ -53,6 +54,7 @@ def draw(
             hint = known_or_nearest(law.follows, inputs)
             raise InputError(f"inputs: {name} follows {law.follows}, which is not drawn ({hint})")
         refuse_fixed(base, name)
+        _refuse_unit(base, name, law)
     for name, distribution in inputs.items():
         if name in free and not distribution.shared:  # no field of a scene takes it
             if distribution.each_section:
@@ -62,6 +64,7 @@ def draw(
                 )
             factors[name] = distribution
             continue
+        _refuse_unit(base, name, distribution)
         places = _places(base, name, distribution)
         for path in _paths_of(name, distribution):
             own = {with_number(base, f"{path}{place}") for place in places}
@@ -83,7 +86,10 @@ def draw(
         words = distribution.model_dump_json(exclude_none=True)
         if name in free:
             plain_name = re.sub(r"\W+", "_", name).strip("_")
-            columns.append(Column(plain_name, "", "", "1", words, values, input=name))
+            unit = distribution.unit or ""
+            if distribution.shared:
+                unit = unit_at(base, distribution.shared[0])
+            columns.append(Column(plain_name, "", "", unit, words, values, input=name))
         if name in free and not distribution.shared:
             continue
         paths = _paths_of(name, distribution)
@@ -126,6 +132,15 @@ def draw(
         before.append(column.path)
     _check_extremes(base, table, design)
     return table
+
+
+def _refuse_unit(base: Scene, name: str, law: Distribution) -> None:
+    if law.unit is not None:
+        own = unit_at(base, _paths_of(name, law)[0])
+        raise InputError(
+            f"inputs: {name}.unit = {show(law.unit)}: the scene says the unit of its paths "
+            f"({unit_text(own) or 'none'}): leave it out"
+        )
 
 
 def _is_number(law: Distribution) -> bool:

@@ -104,6 +104,16 @@ def found(test_files, tmp_path_factory):
     return ringsim.Calibration.read(test_files).run(workers=0, out=out / "cal"), out / "cal"
 
 
+@pytest.mark.parametrize("verb", ["calibrate", "sensors"])
+def test_cost_is_told_before_anything_runs(test_files, tmp_path, monkeypatch, verb):
+    monkeypatch.chdir(tmp_path)
+    told = CliRunner().invoke(cli, [verb, str(test_files), "--dry-run", "--workers", "1"])
+    assert told.exit_code == 0
+    assert not list(tmp_path.iterdir())
+    assert "about 48 runs" in told.stdout
+    assert "predicted      about" in told.stdout
+
+
 def test_truth_lies_within_what_was_found(found):
     posterior, _ = found
     for name, value in TRUTH.items():

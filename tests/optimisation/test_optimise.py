@@ -105,6 +105,24 @@ def test_slowest_speed_that_is_fast_enough_is_found(found):
     assert float(front["value"].sel(design="present")[0]) == 0.16
 
 
+def test_cost_is_told_before_anything_runs(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    table = tomllib.loads(FILE)
+    told = CliRunner().invoke(
+        cli, ["optimise", str(file), "--dry-run", "--workers", "2", "--set", "verdict=30"]
+    )
+    assert told.exit_code == 0
+    assert not list(tmp_path.iterdir())
+    least = (table["designs"] + 1) * table["samples"] + 3 * table["check"] + 2 * 30
+    assert f"about {least} runs" in told.stdout
+    assert "predicted      about" in told.stdout
+    assert "checks" not in told.stdout.partition("workers")[2]
+    checked = file.parent / "checked.toml"
+    checked.write_text(FILE.replace("[set]", "check_every = 10\n[set]", 1))
+    told = CliRunner().invoke(cli, ["optimise", str(checked), "--dry-run"])
+    assert "checks         6 with the full engine" in told.stdout  # 0, 10, 20 of both designs
+
+
 def test_numbers_of_the_front_are_those_of_its_campaigns(found):
     front, out = found
     for name in front["design"].values:

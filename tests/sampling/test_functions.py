@@ -15,7 +15,7 @@ from ringsim.campaign.specification import campaign_of
 
 TABLE = [[200.0, 9e4], [250.0, 1.0e5], [320.0, 1.4e5]]
 INPUTS: dict[str, Any] = {
-    "temperature": {"kind": "uniform", "low": 220.0, "high": 310.0},
+    "temperature": {"kind": "uniform", "low": 220.0, "high": 310.0, "unit": "K"},
     "lot": {"kind": "discrete", "values": ["A", "B"], "probabilities": [0.5, 0.5]},
     "cables.lower.axial_stiffness": {"kind": "function", "input": "temperature", "table": TABLE},
     "cables.upper.axial_stiffness":
@@ -39,7 +39,8 @@ def test_they_are_their_tables_of_what_was_drawn(tmp_path: Path) -> None:
     cold, lot = found["temperature"].values, found["lot"].values
     assert 220.0 < cold.min() < cold.max() < 310.0
     assert set(lot) == {"A", "B"}
-    assert "units" not in found["temperature"].attrs  # nobody has told one
+    assert found["temperature"].attrs["units"] == "K"
+    assert "units" not in found["lot"].attrs  # nobody has told one
     lower = found["cables_lower_axial_stiffness"].values
     np.testing.assert_allclose(lower, np.interp(cold, *np.transpose(TABLE)), rtol=1e-15)
     upper = found["cables_upper_axial_stiffness"].values
@@ -87,6 +88,7 @@ def test_an_input_of_a_path_may_be_followed_place_by_place() -> None:
         ({"table": [[200.0, 1e5]]}, "must have 2 or more entries"),
         ({"table": [[200.0, -1e5], [320.0, 1e5]]}, "axial_stiffness"),
         ({"shared": ["rods.density"]}, "give each path a function of its own"),
+        ({"unit": "N"}, 'unit = "N": the scene says the unit of its paths (N): leave it out'),
     ],
 )  # fmt: skip
 def test_what_is_no_function_is_refused(change: dict[str, Any], told: str) -> None:
@@ -104,6 +106,23 @@ def test_what_has_no_path_is_refused_unless_it_is_followed() -> None:
     each = INPUTS["temperature"] | {"each_section": True}
     with pytest.raises(InputError, match="nothing tells how many values"):
         campaign(INPUTS | {"temperature": each}).plan()
+
+
+@pytest.mark.quick
+def test_a_unit_is_told_of_what_has_no_path_alone() -> None:
+    path = "rods.young_modulus"
+    drawn = {"kind": "uniform", "low": 1.1e11, "high": 1.3e11, "unit": "MPa"}
+    with pytest.raises(InputError, match="the unit of its paths \\(Pa\\): leave it out"):
+        campaign({path: drawn}).plan()
+    table = campaign_of(
+        'name = "g"\nscene = "truss2"\ndesign = { kind = "random", samples = 4 }\n[inputs]\n'
+        'cold = { kind = "uniform", low = 200, high = 320, unit = "K" }\n"rods.young_modulus" '
+        '= { kind = "function", input = "cold", table = [[200, 1.2e11], [320, 1.3e11]] }\n',
+        Path("g.toml"),
+    ).draw()
+    assert {each.name: each.units for each in table.columns} == {
+        "cold": "K", "rods_young_modulus": "Pa",
+    }  # fmt: skip
 
 
 @pytest.mark.quick
