@@ -76,7 +76,7 @@ def winding_laws(runs: Path) -> Figure:
         joints = campaign["joints_vjoint_viscous"].to_numpy().reshape(-1, len(LAWS))[:, 0]
     figure = Figure(figsize=(10.4, 3.9))
     panels = figure.subplots(1, len(grid), sharey=True)
-    looks = ((style.BLUE, "o"), (style.ORANGE, "s"), (style.VERMILLION, "^"))
+    looks = ((style.BLUE, "o"), (style.ORANGE, "s"), (style.VERMILION, "^"))
     for axes, (words, values) in zip(panels, grid.items(), strict=True):
         rows = np.asarray(values).reshape(-1, len(LAWS))
         for row, friction, (colour, marker) in zip(rows, joints, looks, strict=True):
@@ -140,7 +140,7 @@ def stalling_motor(runs: Path) -> Figure:
             colour, marker = LOOKS[word]
             axes.plot(margins[own], np.nan_to_num(times[own], nan=NEVER), marker, color=colour,
                       markersize=4.5, alpha=0.8, label=word)  # fmt: skip
-        axes.axvline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+        axes.axvline(0.0, color=style.VERMILION, linewidth=1.0, linestyle=(0, (4, 3)))
         axes.set_xlabel("Margin of the rigid ring, no factors")
         axes.set_title("On the ground" if "ground" in name else "In flight", fontsize=10)
     panels[0].set_ylabel("Deployment time (s); at the top: none")
@@ -241,7 +241,7 @@ def rare_asynchrony(runs: Path) -> Figure:
     with xr.open_dataset(runs / "rare-asynchrony" / "campaign.nc") as file:
         rare = file.load()
     for number, one in enumerate(repetitions(rare, float(limits[-1]))):
-        axes.plot(grid, [one.beyond(x)[0] for x in grid], color=style.VERMILLION, linewidth=0.9,
+        axes.plot(grid, [one.beyond(x)[0] for x in grid], color=style.VERMILION, linewidth=0.9,
                   label="" if number else "subset simulation, a line a replicate")  # fmt: skip
     for limit, fits in zip(limits.tolist(), fit[len(grid) :], strict=True):
         found = repetitions(rare, limit)
@@ -255,7 +255,7 @@ def rare_asynchrony(runs: Path) -> Figure:
         )
         label = "" if limit > limits[0] else "mean of the replicates, 95 %"
         axes.errorbar(limit, each.mean(), [[each.mean() - low], [high - each.mean()]], capsize=3,
-                      color=style.VERMILLION, marker="s", markersize=4, linestyle="none",
+                      color=style.VERMILION, marker="s", markersize=4, linestyle="none",
                       elinewidth=1.0, label=label)  # fmt: skip
     axes.set(yscale="log", xlabel="Largest asynchrony (degree)", ylabel="Probability of more")
     axes.set(xlim=(2.5, 5.6), ylim=(1e-6, 1.0))

@@ -378,6 +378,7 @@ class Storing(Integration):
 def _of_faults(switches: Switches) -> Iterator[tuple[int, Place, tuple[Any, ...]]]:
     """Numbers of the laws that faults bring, with their V-joints and what tells them apart."""
     for number, law in enumerate(switches.laws):
-        if isinstance(law.record, Fault):
+        record = cast("object", law.record)
+        if isinstance(record, Fault):
             for place in law.places:
-                yield number, place, (law.group, *place, law.record.time)
+                yield number, place, (law.group, *place, record.time)

@@ -174,7 +174,7 @@ def _course(figure: Figure, run: xr.Dataset, paint: _Paint) -> Any:
     axes.set_xlabel(style.label(run["time"]), fontsize=9)
     axes.set_ylabel(str(paint.course.attrs["units"]), fontsize=9)
     axes.set_title(str(paint.course.attrs["long_name"]), fontsize=9, pad=3)
-    return axes.axvline(0.0, color=style.VERMILLION, linewidth=1.6)
+    return axes.axvline(0.0, color=style.VERMILION, linewidth=1.6)
 
 
 def by_lag(run: xr.Dataset, shape: Shape) -> _Paint:

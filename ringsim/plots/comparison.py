@@ -141,7 +141,7 @@ def pairs(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
         axes.axhline(found[f"{name}_difference"].item(), color=style.BLUE, linewidth=1.2)
         for own, marker, colour, word in (
             (known & ~other, "o", style.BLUE, "pair"),
-            (known & other, "x", style.VERMILLION, "pair whose outcome differs"),
+            (known & other, "x", style.VERMILION, "pair whose outcome differs"),
         ):
             if own.any():
                 axes.plot(one[own], apart[own], marker, color=colour, markersize=4.5, alpha=0.8,
@@ -178,10 +178,10 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
                       linestyle=dashes, label=called)  # fmt: skip
         wanted = dict.fromkeys(limit for each in both for limit in limits(each, name))
         for word, limit in wanted:
-            axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (1, 1.5)), linewidth=1.3)
+            axes.axvline(limit, color=style.VERMILION, linestyle=(0, (1, 1.5)), linewidth=1.3)
             units = str(both[0][name].attrs.get("units", "1"))
             axes.annotate(f"{word} {with_unit(f'{limit:g}', units)}", (limit, 1.0), ha="center",
-                          color=style.VERMILLION, xycoords=axes.get_xaxis_transform(),
+                          color=style.VERMILION, xycoords=axes.get_xaxis_transform(),
                           textcoords="offset points", xytext=(0, 2), fontsize=9)  # fmt: skip
         axes.set_title(f"n = {', '.join(counts)}", fontsize=9, pad=16.0 if wanted else None)
         axes.set_ylim(0.0, 1.02)
@@ -365,7 +365,7 @@ def measured_and_computed(found: list[Residuals], title: str) -> Figure:
     rows = figure.subplots(max(1, len(shown)), 2, sharex=True, squeeze=False)
     for (left, right), each in zip(rows, shown, strict=False):
         variable = VARIABLES[each.readings.sensor.variable]
-        left.plot(each.times, each.measured, ".", color=style.VERMILLION, markersize=3.0, zorder=3,
+        left.plot(each.times, each.measured, ".", color=style.VERMILION, markersize=3.0, zorder=3,
                   label="measured", rasterized=len(each.times) > 2000)  # fmt: skip
         words, band = "computed", np.broadcast_to([[-2.0], [2.0]], (2, len(each.times)))
         if each.band is not None:
@@ -429,7 +429,7 @@ def learnt(posterior: xr.Dataset) -> Figure:
     far = posterior["chance"].values < UNEXPLAINED
     right.axvline(1.0, color=style.GREY, linewidth=0.9)
     right.scatter(posterior["rms_in_deviations"], range(sensors), s=22, zorder=3,
-                  color=np.where(far, style.VERMILLION, style.BLUE))  # fmt: skip
+                  color=np.where(far, style.VERMILION, style.BLUE))  # fmt: skip
     right.set_yticks(range(sensors), [str(name) for name in posterior["sensor"].values])
     right.set_xlim(0.0, 1.08 * max(1.2, float(posterior["rms_in_deviations"].max())))
     right.set_xlabel("rms of misfits (1: scatter alone)")

@@ -19,7 +19,7 @@ from ringsim.plots.run import mark, peak_of
 from ringsim.scene import Scene, scene_from_toml
 
 _SOURCES = (
-    style.SKY, style.ORANGE, style.GREEN, style.VERMILLION, style.PURPLE, style.BLUE, style.GREY,
+    style.SKY, style.ORANGE, style.GREEN, style.VERMILION, style.PURPLE, style.BLUE, style.GREY,
 )  # fmt: skip
 _HATCHES = ("", "//", "..", "\\\\", "xx", "--", "oo")
 
@@ -63,12 +63,12 @@ def drive(dataset: xr.Dataset) -> Figure:
     figure.legend(*upper.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     margin = known["drive_margin"].where(known["time"] < stopped).values
     lower.plot(angle, margin, color=style.BLUE)
-    lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    lower.axhline(0.0, color=style.VERMILION, linewidth=1.0, linestyle=(0, (4, 3)))
     names = ("least_drive_margin_angle", "least_drive_margin")
     where, least = (float(dataset[name]) for name in names)
     told = []
     if np.isfinite(margin).any():
-        lower.plot(where, least, "o", color=style.VERMILLION, markersize=6, zorder=4)
+        lower.plot(where, least, "o", color=style.VERMILION, markersize=6, zorder=4)
         told = [f"least margin {least:.3f} at {where:.0f} deg"]
     if (known["time"] >= stopped).any():
         told.append(f"no margin from {stopped:.4g} s on: all winches have stopped")
@@ -230,7 +230,7 @@ def _way(dataset: xr.Dataset, scene: Scene) -> xr.DataArray:
 
 _LINES = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE)
 _LOCKS = ("lock_time", "latch_rate", "lock_impulse")
-_LEAST: dict[str, Any] = {"color": style.VERMILLION, "linewidth": 1.2, "linestyle": (0, (5, 2))}
+_LEAST: dict[str, Any] = {"color": style.VERMILION, "linewidth": 1.2, "linestyle": (0, (5, 2))}
 _BESIDE = 0.12
 """Half the distance of the marks of two planes, which mostly lock alike, in sections."""
 _MARKS = (("o", style.BLUE), ("D", style.ORANGE), ("s", style.GREEN))

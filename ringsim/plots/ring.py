@@ -38,7 +38,7 @@ _POINT = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
 """Ends of the line, m, that stands for a point: one without a length is not drawn."""
 LOOKS: dict[str, dict[str, Any]] = {
     "diagonals": {"color": style.BLUE, "linewidth": 1.5},
-    "bars": {"color": style.VERMILLION, "linewidth": 1.5, "label": "folding bars"},
+    "bars": {"color": style.VERMILION, "linewidth": 1.5, "label": "folding bars"},
     "hinge assemblies": {"color": style.INK, "linewidth": 3.0},
     "boom": {"color": style.GREY, "linewidth": 5.0},
     "spacecraft": {"color": style.PURPLE, "linewidth": 11.0, "marker": "o"},
@@ -318,7 +318,7 @@ def modes(found: xr.Dataset) -> Figure:
     if latched.any():
         axes.plot([], [], "o", color=style.INK, markerfacecolor="white", label="V-joints latched")
     lost = found["angle"].values[(found["growth_rate"] > 0.0).any("mode").values]
-    axes.plot(lost, np.zeros(len(lost)), "X", color=style.VERMILLION, clip_on=False, zorder=4,
+    axes.plot(lost, np.zeros(len(lost)), "X", color=style.VERMILION, clip_on=False, zorder=4,
               label="unstable" if len(lost) else "_")  # fmt: skip
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel(style.label(found["angle"]))
@@ -412,7 +412,7 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     middle = int(np.abs(station - 0.5 * (station[0] + station[-1])).argmin())
     largest = int(np.nanargmax(strain.max("time").values))
     passages = list(zip(_split(dataset, strain), _PASSAGES, strict=True))
-    for place, colour in {largest: style.VERMILLION, middle: style.GREEN}.items():
+    for place, colour in {largest: style.VERMILION, middle: style.GREEN}.items():
         for (lengths, values), (_, _, dashes) in passages:
             left.plot(lengths, values.isel(station=place), color=colour, linestyle=dashes)
         left.plot([], [], color=colour, label=f"{1e3 * station[place]:.0f} mm along the beam")
@@ -447,7 +447,7 @@ def _mark(axes: Axes, dataset: xr.Dataset, peak: Peak, units: str) -> None:
     """A dot at the largest value, at the cable's length at that time."""
     lengths = 1e3 * dataset["cable_length"].isel(plane=0).dropna("time")
     axes.plot(
-        np.interp(peak.time, lengths["time"], lengths), peak.value, "o", color=style.VERMILLION,
+        np.interp(peak.time, lengths["time"], lengths), peak.value, "o", color=style.VERMILION,
         label=f"largest: {peak.value:.3g} {units}".rstrip(), clip_on=False, zorder=4,
     )  # fmt: skip
 

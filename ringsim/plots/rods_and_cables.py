@@ -30,7 +30,7 @@ _LOOKS: tuple[tuple[str, Any], ...] = (
 _HALVES = {"left": 1.8, "right": 0.8}
 """Width of the line of a half."""
 _LARGEST: dict[str, Any] = {
-    "color": style.VERMILLION, "linewidth": 1.0, "linestyle": (0, (8, 1.5, 1, 1.5)),
+    "color": style.VERMILION, "linewidth": 1.0, "linestyle": (0, (8, 1.5, 1, 1.5)),
 }  # fmt: skip
 
 
@@ -324,7 +324,7 @@ def cables(dataset: xr.Dataset) -> Figure:
         axes.fill_between(dataset["time"], least, most, color=style.PALE, linewidth=0.0)
         if plane == peak.place["plane"]:
             worst = peak.within(spans.sel(span=peak.place["span"]))
-            axes.plot(*worst, color=style.VERMILLION, linewidth=1.0, zorder=3)
+            axes.plot(*worst, color=style.VERMILION, linewidth=1.0, zorder=3)
             later = " until all have locked" if float(tension.max()) > peak.value else ""
             name = spans.sel(span=peak.place["span"]).coords.get("span_name")
             place = f"span {peak.place['span']}" + (f", {name.item()}" if name is not None else "")

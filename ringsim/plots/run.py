@@ -86,12 +86,12 @@ def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) ->
     height = factor * peak.value
     told = known_to(f"{height:.3g}", factor * peak.error, exact=height)
     units = unit_text(units)
-    axes.plot(peak.time, height, "o", color=style.VERMILLION, markersize=6, zorder=4, clip_on=False)
+    axes.plot(peak.time, height, "o", color=style.VERMILION, markersize=6, zorder=4, clip_on=False)
     early = peak.time < 0.5 * sum(axes.get_xlim())
     style.free(axes.text(
         0.98 if early else 0.02, 0.95 if early else 0.82,
         f"largest: {told} {units} at {peak.time:.4g} s\n{place}".strip(), transform=axes.transAxes,
-        va="top", ha="right" if early else "left", color=style.VERMILLION, bbox=style.PAPER,
+        va="top", ha="right" if early else "left", color=style.VERMILION, bbox=style.PAPER,
         zorder=5,
     ))  # fmt: skip
 
@@ -230,7 +230,7 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     leader, laggard = ("{} {}".format(*joint) for joint in apart(dataset, peak.time))
     mark(whole, peak, str(values.attrs.get("units", "")), f"{laggard} behind {leader}")
     if peak.time >= begin:
-        close.plot(peak.time, peak.value, "o", color=style.VERMILLION, markersize=6, zorder=4)
+        close.plot(peak.time, peak.value, "o", color=style.VERMILION, markersize=6, zorder=4)
     # Of runs whose joints wait for each other it may be half of the whole.
     style.name_panel(close, f"from {begin:.3g} s on, enlarged")
     style.head(figure, whole, dataset, "Asynchrony")
@@ -263,7 +263,7 @@ _LOOKS = {
     "work": (style.INK, "-"),
     "kinetic_energy": (style.BLUE, "-"),
     "elastic_energy": (style.ORANGE, (0, (5, 1.5))),
-    "dissipation": (style.VERMILLION, (0, (1.2, 1.2))),
+    "dissipation": (style.VERMILION, (0, (1.2, 1.2))),
 }
 
 
@@ -309,7 +309,7 @@ def imbalance(dataset: xr.Dataset) -> xr.DataArray:
 
 
 _TRIANGLE: dict[str, Any] = {
-    "color": style.VERMILLION, "markersize": 9, "markeredgecolor": "white", "clip_on": False,
+    "color": style.VERMILION, "markersize": 9, "markeredgecolor": "white", "clip_on": False,
     "zorder": 4,
 }  # fmt: skip
 _DOT: dict[str, Any] = {"color": style.INK, "markersize": 4, "clip_on": False}

@@ -26,7 +26,7 @@ _LOOKS = {
     "elements": (style.GREEN, "D"),
     "formulation": (style.ORANGE, "^"),
     "dissipation": (style.PURPLE, "v"),
-    "newton": (style.VERMILLION, "P"),
+    "newton": (style.VERMILION, "P"),
     "setting": (style.GREY, "X"),
 }
 
@@ -105,7 +105,7 @@ _CELLS: dict[str, tuple[str, str]] = {
     _AGAIN: (style.SKY, "r"),
     "cut off": ("#d9d9d9", "t"),
     "energy lost": (style.ORANGE, "L"),
-    "energy grew": (style.VERMILLION, "G"),
+    "energy grew": (style.VERMILION, "G"),
     "blow-up": ("#7f0000", "B"),
     "overloaded": (style.PURPLE, "P"),
     "slackened": ("#b8860b", "k"),
@@ -225,7 +225,7 @@ def front(found: xr.Dataset) -> Figure:
 
 def _look(k: int) -> dict[str, Any]:
     """Of the present design, the first one, and of the chosen ones."""
-    return {"color": style.VERMILLION if k else style.INK, "marker": "D" if k else "s",
+    return {"color": style.VERMILION if k else style.INK, "marker": "D" if k else "s",
             "markersize": 4.5, "linestyle": ""}  # fmt: skip
 
 

@@ -101,7 +101,7 @@ def _curves(axes: Axes) -> Iterator[Outline]:
 
 
 INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
-BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
+BLUE, SKY, GREEN, ORANGE, VERMILION, PURPLE = (
     "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7",
 )  # fmt: skip
 """Colour-blind safe palette (Okabe and Ito 2008)."""
@@ -448,9 +448,9 @@ def draw_limit(axes: Axes, limit: float, words: str) -> None:
     """A dashed line at a limit, with its name at its left end; nothing at NaN."""
     if math.isnan(limit):
         return
-    axes.axhline(limit, color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 2)))
+    axes.axhline(limit, color=VERMILION, linewidth=1.2, linestyle=(0, (5, 2)))
     axes.annotate(words, (0.0, limit), xytext=(4, 2), xycoords=axes.get_yaxis_transform(),
-                  textcoords="offset points", color=VERMILLION, fontsize=9)  # fmt: skip
+                  textcoords="offset points", color=VERMILION, fontsize=9)  # fmt: skip
 
 
 _MOST_MARGIN = 1e3

@@ -32,7 +32,7 @@ from ringsim.plots.run import LEAST_SPAN
 
 _NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")
 """Asynchrony first: without a value of it there is nothing to draw."""
-_LOOKS = style.BLUE, style.VERMILLION
+_LOOKS = style.BLUE, style.VERMILION
 """Colour of each plane, dark enough for print in grey; words beside its panels name it."""
 _WORST: dict[str, Any] = {
     "color": style.INK, "linewidth": 1.0, "linestyle": (0, (6, 1.2, 1, 1.2)),

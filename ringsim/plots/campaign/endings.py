@@ -216,9 +216,9 @@ def _strips(axes: Axes, campaign: xr.Dataset, samples: Array, values: Array) -> 
     axes.set_ylim(len(shown) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
     for _, limit in limits(campaign, "least_drive_margin"):
-        axes.axvline(limit, color=style.VERMILLION, linewidth=1.3)
+        axes.axvline(limit, color=style.VERMILION, linewidth=1.3)
         axes.annotate(f"required {limit:g}", (limit, 1.0), rotation=0, ha="center", va="bottom",
-                      color=style.VERMILLION, fontsize=9,
+                      color=style.VERMILION, fontsize=9,
                       xycoords=axes.get_xaxis_transform())  # fmt: skip
     if values.size and values.min() < 0.0 < values.max():
         axes.axvline(0.0, **_ZERO)
@@ -320,7 +320,7 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
             axes.vlines(at, lower, upper, color=style.SKY, linewidth=5.0, label="5-95 %")
             axes.plot(at, middle, "o", color=style.INK, markersize=4, label="median")
         if least > 0.0:
-            axes.axhline(least, color=style.VERMILLION, linewidth=1.2, linestyle=(0, (5, 2)),
+            axes.axhline(least, color=style.VERMILION, linewidth=1.2, linestyle=(0, (5, 2)),
                          label=f"latches catch from {least:.3g} rad/s on")  # fmt: skip
         axes.set_title(f"{plane} plane", fontsize=9.5)
         axes.grid(visible=False, axis="x")

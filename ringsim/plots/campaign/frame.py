@@ -55,7 +55,7 @@ LOOKS = {
     "folded": (style.SKY, "o"),
     "not latched": ("#8c6d31", "P"),
     "partly deployed": (style.ORANGE, "D"),
-    "stalled": (style.VERMILLION, "s"),
+    "stalled": (style.VERMILION, "s"),
     "overloaded": (style.PURPLE, "^"),
     "slackened": ("#b8860b", "<"),
     "cut off": (style.GREEN, "v"),
@@ -271,7 +271,7 @@ def middle_told(campaign: xr.Dataset, of: str) -> str:
 
 _FEW = 8
 """Cases up to which each has a colour and a name of its own."""
-_OWN = (style.BLUE, style.ORANGE, style.GREEN, style.VERMILLION, style.PURPLE, style.SKY, "#8c6d31")
+_OWN = (style.BLUE, style.ORANGE, style.GREEN, style.VERMILION, style.PURPLE, style.SKY, "#8c6d31")
 _LONGEST = 26
 """Letters of the name of a move."""
 

@@ -88,11 +88,11 @@ def distributions(campaign: xr.Dataset) -> Figure:
             axes.plot(quantile(values, _LEVELS), heights, "o", color=style.INK, markersize=4,
                       clip_on=False, zorder=4)  # fmt: skip
         for word, limit in limits(campaign, name):
-            axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (5, 2)), linewidth=1.3)
+            axes.axvline(limit, color=style.VERMILION, linestyle=(0, (5, 2)), linewidth=1.3)
             # Above the frame, where no curve runs.
             units = str(campaign[name].attrs.get("units", "1"))
             axes.annotate(f"{word} {with_unit(f'{limit:g}', units)}", (limit, 1.0), ha="center",
-                          color=style.VERMILLION, xycoords=axes.get_xaxis_transform(),
+                          color=style.VERMILION, xycoords=axes.get_xaxis_transform(),
                           textcoords="offset points", xytext=(0, 2), fontsize=9)  # fmt: skip
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -224,7 +224,7 @@ def convergence(campaign: xr.Dataset) -> Figure:
                               label="95 % interval of the mean")  # fmt: skip
         size = 2.5 if len(counts) < 50 else 0.0
         axes.plot(counts, mean, color=style.BLUE, label="mean", marker="o", markersize=size)
-        axes.plot(counts, far, color=style.VERMILLION, linestyle="dashed", marker="s",
+        axes.plot(counts, far, color=style.VERMILION, linestyle="dashed", marker="s",
                   markersize=size, label=f"{level:.0%} quantile".replace("%", " %"))  # fmt: skip
         axes.ticklabel_format(axis="y", useOffset=False)
         _named(axes, style.label(campaign[name], width=42), len(values))
@@ -421,7 +421,7 @@ def rare_event(campaign: xr.Dataset) -> Figure:
         axes.plot(places, shares, color=style.BLUE, marker="o", markersize=4, linewidth=1.0,
                   alpha=0.7, label="" if number else "levels, one line per replicate")  # fmt: skip
     target = design.sign * design.target
-    axes.axvline(target, color=style.VERMILLION, linestyle=(0, (5, 2)), linewidth=1.3)
+    axes.axvline(target, color=style.VERMILION, linestyle=(0, (5, 2)), linewidth=1.3)
     probability, (low, high) = found["tail_probability"][1], found["tail_probability_interval"][1]
     if probability > 0.0 and np.isfinite([low, high]).all():
         axes.errorbar(target, probability, [[probability - low], [high - probability]],

@@ -293,7 +293,7 @@ def _draw(axes: Axes, bars: Bars) -> None:
     height = np.arange(len(bars.names))[::-1].astype(float)
     if not bars.names:
         axes.text(0.5, 0.5, bars.told, ha="center", va="center", transform=axes.transAxes,
-                  fontsize=9, color=style.VERMILLION)  # fmt: skip
+                  fontsize=9, color=style.VERMILION)  # fmt: skip
         axes.set_xticks([])
         axes.set_yticks([])
         return
@@ -313,7 +313,7 @@ def _draw(axes: Axes, bars: Bars) -> None:
         # An index is a share: what it has below zero is its own error.
         signed = measure.endswith("rank_correlation")
         for side in np.unique(np.sign(bars.values)) if signed else (1.0,):
-            axes.axvline(side * bars.chance, color=style.VERMILLION, linestyle="dashed",
+            axes.axvline(side * bars.chance, color=style.VERMILION, linestyle="dashed",
                          linewidth=1.2, label=_BY_CHANCE)  # fmt: skip
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
     axes.locator_params(axis="x", nbins=5)
