@@ -194,7 +194,7 @@ def over_samples(
     for name in dict.fromkeys(name for each in outputs.values() for name in each.names):
         if name in arrays:
             dims = ("sample", *VARIABLES[name].dims)
-            coordinates = {dim: axes[dim] for dim in dims if dim in axes}
+            coordinates = {dim: axes[dim] for dim in dims[1:] if dim in axes}
             values = np.asarray(arrays[name], dtype=float)
             if VARIABLES[name].dtype.startswith("i"):  # missing counts are negative
                 values = np.where(values < 0.0, np.nan, values)

@@ -1,7 +1,12 @@
 """Campaigns from Python: the tables of a campaign file as arguments, the same way from there."""
 
+import os
+import pickle
+import subprocess
+import sys
 import tomllib
 from collections.abc import Mapping
+from concurrent.futures import Executor, Future, wait
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -14,14 +19,29 @@ from ringsim.analysis.design import open_stored
 from ringsim.analysis.engines import too_far
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.plan import plan
-from ringsim.campaign.run import Order, Share, require_no_launcher, start
+from ringsim.campaign.run import (
+    Choices,
+    Order,
+    Share,
+    require_no_launcher,
+    run_campaign,
+    start,
+)
 from ringsim.campaign.specification import campaign_of, load_campaign
 from ringsim.campaign.stopping import is_behind, merge
 from ringsim.choice import kind_of
+from ringsim.execution.child import end_with
 from ringsim.execution.mpi import launched_size
+from ringsim.execution.slot import Local, without_mpi
 from ringsim.files import MERGED
 from ringsim.overrides import flat
-from ringsim.refusal import EXIT_FAILED, EXIT_INTERRUPTED, InputError
+from ringsim.refusal import (
+    EXIT_BAD_INPUT,
+    EXIT_DONE,
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    InputError,
+)
 from ringsim.sampling.distributions import label_of
 from ringsim.scene import Scene
 from ringsim.units import Model
@@ -129,6 +149,7 @@ class Campaign:
     def run(
         self, workers: int | None = None, *, out: str | Path | None = None,
         retry_failed: bool = False, settings: Mapping[str, Any] | None = None, part: str = "1/1",
+        executor: Executor | None = None,
     ) -> xr.Dataset:  # fmt: skip
         """Run what is missing in the folder ``out`` (runs/NAME), and return the merged campaign.
 
@@ -150,6 +171,10 @@ class Campaign:
             Solver and record settings, by scene path, of those that run again.
         part
             "I/N" runs every N-th sample alone, from the I-th on.
+        executor
+            Any executor of ``concurrent.futures``' kind (its own, mpi4py's, dask's, parsl's): each
+            of ``workers`` tasks runs a part of the samples in a solver process beside it.  All of
+            them must see the folder, and have ringsim installed.
 
         Raises
         ------
@@ -159,9 +184,12 @@ class Campaign:
             After Ctrl-C or another signal: the same call goes on with what is left.
         CampaignError
             If more than ``max_failed`` samples failed, or engines differ by more than
-            ``max_difference``.  Failed samples alone are no error: see ``status``.
+            ``max_difference``, or a task of an executor was lost, after which the same call goes
+            on.  Failed samples alone are no error: see ``status``.
         """
         order = self._order(out, retry_failed, settings or {}, part)
+        if executor is not None:
+            return self._opened(order.folder, self._run_on(executor, workers, order))
 
         def placed() -> Order:
             require_no_launcher(workers)
@@ -170,10 +198,27 @@ class Campaign:
         ended = start(workers, placed, lambda _: None)
         if ended.refused is not None:
             raise ended.refused
-        if ended.code == EXIT_INTERRUPTED:
+        return self._opened(order.folder, ended.code)
+
+    def _run_on(self, executor: Executor, workers: int | None, order: Order) -> int:
+        if order.share.count > 1:
+            raise InputError(
+                f"part = {order.share.number}/{order.share.count}: an executor runs all parts: "
+                "leave it out"
+            )
+        if not workers or workers < 1:
+            raise InputError(
+                f"workers = {workers}: an executor runs so many tasks, each with a solver process: "
+                "give 1 or more"
+            )
+        return _run_on(executor, workers, order)
+
+    def _opened(self, folder: Path, code: int) -> xr.Dataset:
+        """The merged campaign, or the exception that an exit code stands for."""
+        if code == EXIT_INTERRUPTED:
             raise KeyboardInterrupt
-        found = open_campaign(order.folder)
-        if ended.code == EXIT_FAILED and (why := self._fault(order.folder, found)):
+        found = open_campaign(folder)
+        if code == EXIT_FAILED and (why := self._fault(folder, found)):
             found.close()
             raise CampaignError(why)
         return found
@@ -199,6 +244,83 @@ class Campaign:
         if apart := too_far(found):
             return f"{folder}: {apart[0]}"
         return ""
+
+
+# Campaigns whose parts are tasks of an executor.
+
+
+def run_part(folder: Path, chosen: tuple[Any, ...], number: int, count: int) -> int:
+    """Run what is missing of a part of a prepared folder, wherever an executor lets it; the exit
+    code.  ``chosen`` are an order's choices.
+
+    It takes a process of its own: executors run tasks side by side in threads, which the library
+    of netCDF does not bear.  InputError if it is refused; RuntimeError if that process ends
+    otherwise.
+    """
+    path = os.pathsep.join(os.path.abspath(each) for each in sys.path)
+    done = subprocess.run(
+        [sys.executable, "-c", f"from {__name__} import serve_part; serve_part()"],
+        input=pickle.dumps((os.getpid(), folder, chosen, number, count)), check=False,
+        stdout=subprocess.PIPE, env=without_mpi() | {"PYTHONPATH": path},
+    )  # fmt: skip
+    if done.returncode == EXIT_BAD_INPUT:
+        raise InputError(done.stdout.decode())
+    if done.returncode not in (EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED):
+        raise RuntimeError(f"its process ended with exit code {done.returncode}")
+    return done.returncode
+
+
+def serve_part() -> None:
+    """The process of a part, which is told on standard input which."""
+    parent, folder, chosen, number, count = pickle.load(sys.stdin.buffer)
+    end_with(parent)
+    limits, most, _, again, overrides = chosen
+    called = open_folder(folder).attributes["campaign_name"]
+    scheduler = Local(1)
+    try:
+        sys.exit(run_campaign(folder, Choices(
+            scheduler, limits, most, Share(number, count), again, overrides, brief=True,
+            label=f"{called}, part {number}/{count}",
+        )))  # fmt: skip
+    except InputError as error:
+        print(error, end="")
+        sys.exit(EXIT_BAD_INPUT)
+    finally:
+        scheduler.close()
+
+
+def _run_on(executor: Executor, parts: int, order: Order) -> int:
+    """Run an order in so many tasks, each a part with journals of its own; the exit code."""
+    while True:
+        more, tasks = order.prepare(), list[Future[int]]()
+        try:
+            for k in range(parts):
+                tasks.append(executor.submit(
+                    run_part, order.folder.resolve(), order.choices, k + 1, parts
+                ))  # fmt: skip
+            wait(tasks)
+        except BaseException:
+            for task in tasks:
+                task.cancel()  # those that run go on to their end
+            raise
+        codes, lost = set[int](), list[tuple[int, Exception]]()
+        for k, task in enumerate(tasks):
+            try:
+                codes.add(task.result())
+            except InputError:
+                raise
+            except Exception as error:  # whatever an executor raises for a worker that has died
+                lost.append((k + 1, error))
+        if lost:
+            number, error = lost[0]
+            why = f"{type(error).__name__}: {error}"
+            raise CampaignError(
+                f"{order.folder}: part {number}/{parts} was lost ({why}): call again to run what "
+                "is left"
+            ) from error
+        code = max(codes)  # a signal's 130, then failure's 3
+        if code != EXIT_DONE or not more:
+            return code
 
 
 def campaign_text(scene: Scene | str | Path, keys: Mapping[str, Any]) -> str:

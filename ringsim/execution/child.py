@@ -30,11 +30,7 @@ _MOST_LOG_BYTES = 1 << 28
 def main() -> None:
     """Serve the pipe whose file descriptor is the first argument."""
     pipe = Connection(int(sys.argv[1]))
-    # The kernel ends this process when its parent ends, however that happens.
-    if sys.platform == "linux":
-        _C.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != int(sys.argv[2]):
-        os._exit(0)
+    end_with(int(sys.argv[2]))
     faulthandler.enable()
     faulthandler.register(signal.SIGUSR2)
     for ignored in (signal.SIGINT, signal.SIGHUP, signal.SIGUSR1):
@@ -42,6 +38,14 @@ def main() -> None:
     try:
         _serve(pipe, pipe.recv())
     except (EOFError, ConnectionResetError, BrokenPipeError):
+        os._exit(0)
+
+
+def end_with(parent: int) -> None:
+    """Let the kernel end this process when its parent ends, however that happens."""
+    if sys.platform == "linux":
+        _C.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
         os._exit(0)
 
 

@@ -1,0 +1,150 @@
+"""Campaigns whose parts are tasks of an executor: the same file from all of them, nothing lost."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import ringsim
+from campaign_bench import comparable
+from ringsim import Campaign, CampaignError, InputError
+from ringsim.campaign.specification import SOLVERS
+
+PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+MPIEXEC = shutil.which("mpiexec", path=PATH)
+MADE = """
+    import sys
+    import ringsim
+    def made(samples=5, **more):
+        return ringsim.Campaign(
+            "truss2", {"loads.force": {"kind": "uniform", "low": 0.0, "high": 0.01}},
+            {"kind": "random", "samples": samples}, seed=3, name="parts", fidelity="frame",
+            check_every=3, set={"solver.end_time": 0.2}, **more,
+        )
+"""
+NAMES: dict[str, Any] = {}
+exec(textwrap.dedent(MADE), NAMES)
+
+
+def made(samples: int = 5, **more: Any) -> Campaign:
+    campaign: Campaign = NAMES["made"](samples, **more)
+    return campaign
+
+
+def in_a_script(text: str, folder: Path, *launcher: str) -> subprocess.CompletedProcess[str]:
+    script = folder / "script.py"
+    script.write_text(textwrap.dedent(MADE) + textwrap.dedent(text), encoding="utf-8")
+    return subprocess.run(
+        [*launcher, str(script)], capture_output=True, text=True, timeout=300, check=False,
+        cwd=folder,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    found = made().run(workers=0, out=tmp_path_factory.mktemp("known") / "o")
+    assert (found["status_checked"] == 0).sum() == 2  # there is something to compare
+    return comparable(found)
+
+
+def require_same(folder: Path, known: xr.Dataset) -> None:
+    found = comparable(ringsim.open_campaign(folder))
+    xr.testing.assert_equal(found.drop_attrs(), known.drop_attrs())
+    assert len(list((folder / "journals").iterdir())) == 3  # one a part
+
+
+def test_processes_give_what_workers_give(tmp_path: Path, known: xr.Dataset) -> None:
+    with ProcessPoolExecutor(2) as pool:
+        found = made().run(3, out=tmp_path / "o", executor=pool)
+    xr.testing.assert_equal(comparable(found).drop_attrs(), known.drop_attrs())
+    require_same(tmp_path / "o", known)
+
+
+@pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: ringsim[mpich]")
+def test_ranks_of_mpi_give_what_workers_give(tmp_path: Path, known: xr.Dataset) -> None:
+    done = in_a_script(
+        """
+        from mpi4py.futures import MPIPoolExecutor
+        if __name__ == "__main__":
+            with MPIPoolExecutor() as pool:
+                made().run(3, out="o", executor=pool)
+        """,
+        tmp_path, str(MPIEXEC), "-n", "3", sys.executable, "-m", "mpi4py.futures",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    require_same(tmp_path / "o", known)
+
+
+def test_a_dask_cluster_gives_what_workers_give(tmp_path: Path, known: xr.Dataset) -> None:
+    pytest.importorskip("distributed")
+    done = in_a_script(
+        """
+        from distributed import Client, LocalCluster
+        if __name__ == "__main__":
+            with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+                with Client(cluster) as client:
+                    made().run(3, out="o", executor=client.get_executor())
+        """,
+        tmp_path, sys.executable,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    require_same(tmp_path / "o", known)
+
+
+def test_a_killed_worker_loses_nothing(tmp_path: Path, known: xr.Dataset) -> None:
+    """The call says which part, and the same call goes on with what is left."""
+
+    def kill(pool: ProcessPoolExecutor) -> None:
+        folder = tmp_path / "o" / "journals"
+        while not folder.exists() or not any(each.stat().st_size for each in folder.iterdir()):
+            time.sleep(0.05)
+        os.kill(next(iter(pool._processes)), signal.SIGKILL)
+
+    with ProcessPoolExecutor(2) as pool, ThreadPoolExecutor(1) as other:
+        killed = other.submit(kill, pool)
+        with pytest.raises(CampaignError, match=r"part \d/3 was lost .*: call again"):
+            made().run(3, out=tmp_path / "o", executor=pool)
+        killed.result()
+    before = {each: each.stat().st_size for each in (tmp_path / "o" / "journals").iterdir()}
+    with ProcessPoolExecutor(2) as pool:
+        found = made().run(3, out=tmp_path / "o", executor=pool)
+    xr.testing.assert_equal(comparable(found).drop_attrs(), known.drop_attrs())
+    assert all(each.exists() and each.stat().st_size >= size for each, size in before.items())
+
+
+def test_a_design_that_grows_goes_on_from_level_to_level(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(SOLVERS, "full", "fake_solver:run")  # 2 / sqrt(force) (1 + 1e9 / E)
+    force = {"kind": "lognormal", "mean": 0.02, "standard_deviation": 0.004}
+    design = {"kind": "subset-simulation", "of": "deployment_time", "above": 15.5, "samples": 20,
+              "share": 0.5, "replicates": 2}  # fmt: skip
+    small = {"structure.sections": 6, "boom": "none", "net": "none", "solver.end_time": 30.0}
+    own = Campaign("ring18", {"loads.force": force}, design, fidelity="full", set=small)
+    known = own.run(workers=0, out=tmp_path / "alone")
+    with ThreadPoolExecutor(2) as pool:
+        found = own.run(2, out=tmp_path / "parts", executor=pool)
+    assert found.sizes["sample"] == known.sizes["sample"] > 40
+    np.testing.assert_array_equal(found["deployment_time"], known["deployment_time"])
+
+
+@pytest.mark.quick
+def test_what_is_refused(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(1) as pool:
+        with pytest.raises(InputError, match="workers = None: an executor runs so many tasks"):
+            made().run(out=tmp_path / "o", executor=pool)
+        with pytest.raises(InputError, match="part = 1/2: an executor runs all parts"):
+            made().run(2, out=tmp_path / "o", part="1/2", executor=pool)
+    assert not (tmp_path / "o").exists()
