@@ -59,7 +59,8 @@ def commit() -> str:
 
 
 def provenance() -> dict[str, str]:
-    """Version, commit and sources as attributes of a file."""
+    """Version, commit and sources as attributes of a file, and by which words it is found."""
     return {
         "ringsim_version": version("ringsim"), "git_commit": commit(), "sources": sources(),
+        "keywords": "deployable structures, ring antenna, multibody dynamics, asynchrony",
     }  # fmt: skip
