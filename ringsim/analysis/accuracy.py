@@ -266,8 +266,9 @@ _ADVICE = (
 )
 _COSTS = (
     "Errors of all settings, marked (bold or *) where no other setting is both cheaper and more "
-    "accurate. The cost is processor time from a fit over all runs (to residuals, Jacobians and "
-    "steps), so that scatter of single timings averages out. The uncertainty of the reference is "
+    "accurate, by the largest error of a setting and all finer ones, as above. The cost is "
+    "processor time from a fit over all runs (to residuals, Jacobians and steps), so that scatter "
+    "of single timings averages out. The uncertainty of the reference is "
     "not in these errors; one that is far below it belongs to a setting that the reference is "
     "made of:"
 )

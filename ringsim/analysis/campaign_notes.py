@@ -23,12 +23,20 @@ from ringsim.analysis.design import (
     learnt_lines,
 )
 from ringsim.analysis.indices import UNLIKELY, dependence
-from ringsim.analysis.intervals import Mask, good, lost, ran, used, worst_sample
+from ringsim.analysis.intervals import CHECKED, Mask, good, lost, ran, used, worst_sample
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import DOUBT, may_be_off
-from ringsim.tables import Table, chance_text, counted, known_to, readable, with_unit
+from ringsim.tables import (
+    Table,
+    chance_text,
+    counted,
+    known_to,
+    number_text,
+    readable,
+    with_unit,
+)
 from ringsim.variables import Variable
 
 _NAMED = 6
@@ -97,6 +105,9 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
         for remark in str(reasons[sample]).split("; ")[1:]:
             if may_be_off(f"; {remark}")[0] or _LATE.match(remark):
                 continue
+            remark = remark.replace("start 1: ", "first attempt: ", 1)
+            if remark.count(")") > remark.count("("):  # which the words before it have opened
+                remark = remark.removesuffix(")")
             kind = _NUMBER.sub("#", _PLACES.sub("#", remark))
             found.setdefault(kind, []).append((sample, remark))
     every = int(held.sum())
@@ -158,9 +169,9 @@ def restart_lines(campaign: xr.Dataset) -> list[str]:
         return []
     # Missing counts are negative.
     counted, every = (float(campaign[n].clip(min=0).sum()) for n in ("steps", "total_steps"))
-    lost = 1.0 - counted / max(every, 1.0)
+    lost, run = 1.0 - counted / max(every, 1.0), int((campaign["restarts"] >= 0).sum())
     return [
-        f"{anew} of {campaign.sizes['sample']} samples were restarted with smaller steps "
+        f"{anew} of {run} samples were restarted with smaller steps "
         f"(restarts, step_used): {lost:.0%} of all {every:.0f} steps went to attempts that failed"
     ]
 
@@ -196,14 +207,28 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                     unknown |= not error
                     number = known_to(number, readable(variable.units, bar)[0] * bar)
                 said = " ".join([number, *told])
+                error += _checked(worst, variable)
                 name = variable.summary[0] + DOUBT * (f'"{variable.name}"' in says.get(OFF, ""))
                 lines.append(f"{name} in sample {sample}: {said}{error}{mark}")
     if unknown:
         lines.append(
-            "no sample has numerical error bars: set error_bars_every in the campaign file, or "
-            "solver.error_bars = true for the scenes of the samples named here"
+            "no sample has numerical error bars: set error_bars_every in the campaign file, or run "
+            "a sample named here again: ringsim replay DIR SAMPLE --scene > one.toml, then ringsim "
+            "run one.toml --set solver.error_bars=true"
         )
     return [*lines, *filter(None, [off_note(says)])]
+
+
+def _checked(worst: xr.Dataset, variable: Variable) -> str:
+    """What the full engine has in a sample instead, where that is another number."""
+    own, other = (float(worst.get(f"{variable.name}{end}", np.nan)) for end in ("", CHECKED))
+    if not abs(other - own) > _ANOTHER * abs(own):
+        return ""
+    return f"; {with_unit(number_text(other, 3), variable.units)} by the full engine"
+
+
+_ANOTHER = 0.05
+"""Share of a worst value by which the full engine's is beside it: more than any rounding."""
 
 
 def _of_others(sound: xr.Dataset, variable: Variable) -> tuple[float, str]:

@@ -17,11 +17,11 @@ from ringsim.analysis.design import (
     LOST,
     NOT_RUN,
     Placement,
+    by_path,
     called,
     distribution_of,
     endings,
     inputs,
-    paths_of,
     placement,
     population_of,
 )
@@ -295,6 +295,9 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
     for name in quantities():
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
+    for side, mine, its in zip(SIDES, (first, second), (second, first), strict=True):
+        only = (name for name in quantities() if name in mine and name not in its)
+        found.attrs[f"only_{side}"] = ", ".join(only)
     shares = differences_of_shares((one, other), placed, (pairs.first, pairs.second))
     more = _changed((one, other), pairs) | settings((one, other)) | _doubtful((one, other))
     more |= _limits((first, second) if single else (one, other))
@@ -350,7 +353,7 @@ def settings(both: Both) -> dict[str, Any]:
     if all(scenes):
         engines = [{"fidelity": str(each.attrs.get("fidelity", ""))} for each in both]
         scenes = [engine | scene for engine, scene in zip(engines, scenes, strict=True)]
-    drawn = [{path for name in inputs(each) for path in paths_of(each[name])} for each in both]
+    drawn = [by_path(each).keys() for each in both]
     paths = dict.fromkeys(path for scene in scenes for path in scene) if all(scenes) else {}
     apart = [
         path for path in paths

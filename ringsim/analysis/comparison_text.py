@@ -331,6 +331,9 @@ def _outputs(found: xr.Dataset) -> Table:
     columns = 8 if found.attrs["runs"] else len(head)
     same = "the same in both" if found.attrs["runs"] else "the same in each pair"
     notes = [f"{same}: {', '.join(alike)}"] * bool(alike)
+    for name, side in zip(names_of(found), ("first", "second"), strict=True):
+        only = found.attrs[f"only_{side}"]
+        notes += [f"in {name} alone: {only}"] * bool(only)
     return marked(Table(head[:columns], [row[:columns] for row in rows], notes), found)
 
 

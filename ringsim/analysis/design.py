@@ -8,7 +8,7 @@ import json
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -328,9 +328,21 @@ def called(variable: xr.DataArray) -> str:
 
 
 def paths_of(variable: xr.DataArray) -> list[str]:
-    """The scene's paths that take the values of an input: one, or all that share it."""
-    shared = distribution_of(variable).get("shared")
-    return shared or [str(variable.attrs.get("path") or variable.name)]
+    """The scene's paths that take the values of an input: one, all that share it, or none."""
+    path = str(variable.attrs.get("path", variable.name))
+    return distribution_of(variable).get("shared") or ([path] if path else [])
+
+
+def by_path(campaign: xr.Dataset) -> dict[str, str]:
+    """The variable with the values of each scene path that varies, also of those that follow an
+    input by a table.
+    """
+    each = {
+        str(n): v.attrs for n, v in campaign.variables.items() if v.attrs.get("role") == "input"
+    }
+    found = {path: name for name in each for path in paths_of(campaign[name])}
+    found |= {str(says.get("path", name)): name for name, says in each.items()}
+    return {path: name for path, name in found.items() if path not in ("", BARS)}
 
 
 def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
@@ -486,34 +498,6 @@ def place_names(variable: xr.DataArray) -> list[str]:
     return [f"{place_called(variable)} {k + 1}" for k in range(variable.sizes[dim])]
 
 
-# Reading the series of many samples block by block, so that memory does not grow with them.
-
-
-BLOCK_BYTES = 32 << 20
-"""Numbers of one variable that are read at once, about."""
-
-
-def blocks(campaign: xr.Dataset, names: Sequence[str]) -> Iterator[xr.Dataset]:
-    """Some variables over ``sample``, in memory, a block of successive samples at a time.
-
-    Slices of samples are what the file is compressed in; any other selection reads it many times.
-    """
-    count = campaign.sizes["sample"]
-    widest = max(campaign[name].nbytes for name in names) // max(count, 1)
-    size = max(1, BLOCK_BYTES // max(widest, 1))
-    for start in range(0, count, size):
-        yield campaign[list(names)].isel(sample=slice(start, start + size)).load()
-
-
-def any_finite(campaign: xr.Dataset, name: str) -> bool:
-    """Whether a variable has a number in a sample whose numbers hold."""
-    first = np.flatnonzero(good(campaign))[:1]  # nearly always tells it, without a block
-    return bool(np.isfinite(campaign[name].isel(sample=first).to_numpy()).any()) or any(
-        bool(np.isfinite(block[name].to_numpy()[good(block)]).any())
-        for block in blocks(campaign, [name, "status"])
-    )
-
-
 # Opening what ringsim has stored: campaigns and runs, by folder or by file.
 
 
@@ -587,7 +571,7 @@ def open_stored(path: Path) -> xr.Dataset:
         if file.suffix == ".toml":
             raise InputError(
                 f"{file}: this is an input file without results: give the folder that ringsim "
-                "campaign has written (runs/NAME by default)"
+                "campaign has written (runs/NAME by default), or the file of ringsim run"
             ) from None
         reason = getattr(error, "strerror", None) or error
         raise InputError(

@@ -465,6 +465,7 @@ def sensors_table(found: xr.Dataset) -> Table:
         "remaining scatter over that of the prior: of all unknowns (geometric mean) with the "
         "sensor alone, and with all above it; of each unknown with all above it",
         "each next sensor is the one that leaves least; about the medians of the priors",
+        *_seeming(found["sensor"].values, after),
         *(f"hardly learnt even from all of them: {name}"
           for name, v in zip(names, found["learnt"].values[-1], strict=True) if v > _HARDLY),
         *filter(None, [silent and f"tell nothing, since some run has no value at any of their "
@@ -473,6 +474,18 @@ def sensors_table(found: xr.Dataset) -> Table:
     return Table(("", "sensor", "alone", "together", *listed), rows, notes)
 
 
+def _seeming(sensors: NDArray[np.str_], after: Array) -> list[str]:
+    """A line on sensors with which more seems to be left than without."""
+    least = np.minimum.accumulate(after)
+    worse = [str(each) for each in sensors[1:][after[1:] > _SEEMS * least[:-1]]]
+    return [
+        f"too few runs to tell how much these add, which seem to take knowledge away, as no sensor "
+        f"can: {', '.join(worse)}: raise runs"
+    ] * bool(worse)  # fmt: skip
+
+
+_SEEMS = 1.01
+"""Of what is left: less than anybody prints."""
 _WRONG = {
     "rms": "the misfits of all sensors together are larger than scatter",
     "pattern": "misfits of successive readings are alike in all sensors together",

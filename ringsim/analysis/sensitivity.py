@@ -586,15 +586,17 @@ def rarer_table(analysis: xr.Dataset) -> Table:
         )
     notes += [f"further significant changes: {', '.join(more)}"] * bool(more)
     if quiet and which:
-        what = "no significant change, by any one distribution, of the probability of violating"
-        notes.append(f"{what} {', '.join(quiet)}")
-    why = "not told, since few samples would have most of the weight"
+        notes.append(
+            "if one input scattered otherwise (by weights of these samples), no significant change "
+            f"of the probability of violating {', '.join(quiet)}"
+        )
+    why = "changes that these samples cannot tell, since few would have most of the weight"
     notes += [f"{why}: {', '.join(unequal)}"] * bool(unequal)
     needs = f"{LEAST_OF_SHARE:g} that violate and as many that do not are needed"
     why = f"too few samples to tell what would make violations rarer ({needs})"
     notes += [f"{why}: {', '.join(few)}"] * bool(few)
     untold = analysis["change_untold"].item()
-    notes += [f"not tried: {untold}"] * bool(untold and (rows or quiet))
+    notes += [f"changes that were not tried: {untold}"] * bool(untold and (rows or quiet))
     head = ("what changes a probability", "input", "its", "from -> to", "probability", "change",
             "95 % interval")  # fmt: skip
     return marked(Table(head, rows, notes, left=3), analysis, 1)

@@ -13,12 +13,12 @@ from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
     LOST,
+    by_path,
     called,
     drawn,
     endings,
     inputs,
     kinds_of_ends,
-    paths_of,
     place_names,
     placement,
     planes_apart,
@@ -413,8 +413,8 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
     already.  Empty without any.
     """
     scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
-    own = {path: name for name in inputs(campaign) for path in paths_of(campaign[name])}
-    rows = list[tuple[str, str, str, float, float, int]]()
+    own = by_path(campaign)
+    rows = list[tuple[str, str, str, float, float, int, int, int]]()
     for limit, peak, series in _limited():
         path = f"limits.{limit}"
         if peak not in campaign or (path not in scene and path not in own):
@@ -429,14 +429,17 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         told = f"{path} = {with_unit(f'{bound:g}', units)}"
         later = series and exceeded(numbers(campaign, peak)[k], values[k])
         of = f"{series} after the last lock, as recorded" if later else peak
-        rows.append((told, peak, of, float(ratio[k]), float(values[k]), k))
+        counts = int((ratio < 0.0).sum()), int(np.isfinite(ratio).sum())
+        rows.append((told, peak, of, float(ratio[k]), float(values[k]), k, *counts))
     least = np.where(good(campaign), numbers(campaign, _DRIVE), np.nan)
     if np.isfinite(least).any():
         k = int(np.nanargmin(least))
-        rows.append((f"{_DRIVE} >= 0", _DRIVE, _DRIVE, float(least[k]), float(least[k]), k))
+        counts = int((least < 0.0).sum()), int(np.isfinite(least).sum())
+        same = float(least[k])
+        rows.append((f"{_DRIVE} >= 0", _DRIVE, _DRIVE, same, same, k, *counts))
     if not rows:
         return xr.Dataset()
-    texts, names, told_of, margin, value, places = zip(*rows, strict=True)
+    texts, names, told_of, margin, value, places, beyond, of_all = zip(*rows, strict=True)
     columns = {
         "text": (np.array(texts, dtype=object), {"long_name": "limit of the scene"}),
         "output": (np.array(names, dtype=object), {"long_name": "output that it bounds"}),
@@ -444,6 +447,8 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         "margin": (np.array(margin), about("limit over the worst value, less 1; drive margin")),
         "value": (np.array(value), about("worst value of all samples, in the output's unit")),
         "sample": (campaign["sample"].to_numpy()[[*places]], about("sample with that value")),
+        "beyond": (np.array(beyond), about("samples that are beyond the limit")),
+        "samples": (np.array(of_all), about("samples that have a value")),
     }
     return xr.Dataset({f"limit_{name}": ("limit", *each) for name, each in columns.items()})
 
@@ -476,16 +481,18 @@ def margin_table(analysis: xr.Dataset) -> Table:
         return Table((), ())
     rows = []
     columns = (analysis[f"limit_{word}"].values.tolist()
-               for word in ("text", "output", "of", "margin", "value", "sample"))  # fmt: skip
-    for told, name, of, margin, value, sample in zip(*columns, strict=True):
+               for word in ("text", "output", "of", "margin", "value", "sample", "beyond",
+                            "samples"))  # fmt: skip
+    for told, name, of, margin, value, sample, beyond, every in zip(*columns, strict=True):
         factor, units = readable(quantities()[name].units, value)
         worst = with_unit(number_text(factor * value), units)
         short = "" if margin >= 0.0 else ": NOT enough"
-        rows.append((told, of, worst, f"{margin:+.3g}{short}", str(sample)))
+        counts = f"{beyond} of {every}"
+        rows.append((told, of, worst, f"{margin:+.3g}{short}", str(sample), counts))
     notes = [
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"
     ] * any(name != _DRIVE for _, name, *_ in rows)
     notes += filter(None, [analysis.attrs.get(LATE)])
-    head = ("limit", "of", "worst value", "margin", "in sample")
+    head = ("limit", "of", "worst value", "margin", "in sample", "samples beyond")
     return marked(Table(head, rows, notes, left=2), analysis, 2)

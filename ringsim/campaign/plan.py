@@ -42,6 +42,8 @@ _SHORT = 20.0
 """A trial run that takes longer hardly consists of loading code, s."""
 _FULL = 30.0
 """Time of the full engine over that of frames: 20 to 50 (docs/evidence/frame.md)."""
+_UNUSUAL = 5.0
+"""Time of a sample that runs over that of others from which on both are told."""
 _STRONG = 0.5
 """Rank correlation of two inputs that is told before anything runs."""
 
@@ -88,7 +90,7 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     if placed.population and not placed.has_intervals:
         lines.append(f"  statistics     {placed.told}")
     if placed.population and not campaign.specification.correlations:
-        lines += _confounded(table)
+        lines += _confounded(table, kind_of(design))
     if placed.population:
         lines += _out_of_reach(campaign.specification.requirements, table.samples)
     if rule := campaign.specification.rule:
@@ -219,7 +221,7 @@ def _out_of_reach(requirements: Mapping[str, Requirement], samples: int) -> list
     return lines
 
 
-def _confounded(table: Table) -> list[str]:
+def _confounded(table: Table, kind: str) -> list[str]:
     """A line if inputs go together, as points of a design do that are few for its dimensions."""
     found: dict[bytes, tuple[str, Array]] = {}
     for column in table.columns:
@@ -242,10 +244,12 @@ def _confounded(table: Table) -> list[str]:
     first, more = strong[0], len(strong) - 1
     others = f" (and {counted(more, 'other pair')})" * (more > 0)
     both = f"{names[first.first]} and {names[first.second]}"
+    cure = "draw more samples"
+    if kind != "random":
+        cure += ' per replicate, or use design.kind = "random"'
     return [
         f"  inputs         {both} have a rank correlation of {first.correlation:+.2f} in these "
-        f"samples{others}: the effect of one may be taken for that of the other; draw more "
-        'samples per replicate, or use design.kind = "random"'
+        f"samples{others}: the effect of one may be taken for that of the other; {cure}"
     ]
 
 
@@ -264,6 +268,8 @@ def extent_told(column: Column) -> str:
         more = [f"and {len(words) - _MOST_SHOWN} more"] if len(words) > _MOST_SHOWN else []
         extent = ", ".join(words[:_MOST_SHOWN] + more) + (unit and f", in {unit}")
     each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
+    if '"kind":"function"' in column.origin:
+        each += f", follows {column.input}"
     return f"  {column.path or column.input or f'label {column.name}'}: {extent}{each}"
 
 
@@ -335,6 +341,9 @@ def status_lines(campaign: Folder) -> list[str]:
     if unfinished:
         longest = sorted(unfinished, key=lambda item: -item[1])[:_MOST_SHOWN]
         listed = ", ".join(f"{_named(number)} ({seconds:.0f} s)" for number, seconds in longest)
+        usual = spent[0] / ended[0] if ended[0] else np.inf
+        if longest[0][1] > _UNUSUAL * usual:
+            listed += f"; those that have ended took {usual:.2g} s each"
         lines.append(f"  running        {len(unfinished)}: {listed}")
     if workers and ended.any():
         if ended[0]:

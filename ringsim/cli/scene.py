@@ -369,7 +369,10 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     sources = list(known_sources) if len(known_sources) > 1 else []
     # Of one standard all that its margin is made of has room beside it.
     whole = list(courses.values()) if len(courses) == 1 else []
-    yield "Forces on the opening angle in N m, without factors; margins with those of the standard."
+    yield (
+        "Forces on the opening angle in N m, without factors, the drive without the losses of "
+        "pulleys and gears; margins with those of the standard."
+    )
     rows = [
         [
             f"{math.degrees(now.angle):.1f}",
@@ -412,6 +415,11 @@ def _formula(name: str, drive: DriveMargin, kinds: list[str]) -> Iterator[str]:
     parts = parts if any(kind in drive.factors for kind in lossy) else ["all that drives"]
     if any(one in drive.factors for one in ("springs", "net", "lines")):
         parts.append(f"springs that drive times {standard.driving_spring:g}")
+    winches = drive.conditions.winches.values()
+    gears = {getattr(winch.winding, "efficiency", 1.0) for winch in winches} - {1.0}
+    for given in sorted(gears) if GEARS in drive.factors else ():
+        counted = 1.0 / (1.0 + standard.friction * (1.0 / given - 1.0))
+        parts.append(f"a gear of efficiency {given:g} counts as {counted:.2g}")
     yield f"  counted drive: {', '.join(parts)}"
 
 

@@ -10,9 +10,8 @@ from matplotlib.ticker import PercentFormatter
 
 from ringsim.analysis.comparison import paired, samples_of
 from ringsim.analysis.comparison_text import differing, doubtful, names_of
-from ringsim.analysis.courses import deployed, names_of_ends
+from ringsim.analysis.courses import blocks, deployed, names_of_ends
 from ringsim.analysis.design import (
-    blocks,
     endings,
     judged_by,
     median_and_worst,

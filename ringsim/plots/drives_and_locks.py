@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from ringsim.analysis.design import inputs, paths_of
+from ringsim.analysis.design import by_path
 from ringsim.choice import kind_of
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
@@ -94,8 +94,8 @@ def drive_end(dataset: xr.Dataset) -> Array:
     Not of winches that stop because their plane has locked.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    drawn = {path: dataset[name].to_numpy() for name in inputs(dataset)
-             for path in paths_of(dataset[name]) if path.endswith("_time")}  # fmt: skip
+    drawn = {path: dataset[name].to_numpy() for path, name in by_path(dataset).items()
+             if path.endswith("_time")}  # fmt: skip
     last = np.array(-np.inf)
     for plane, cable in [] if scene.cables is None else scene.cables.present():
         for key, winch in zip(("winch", "far_winch"), cable.winches, strict=False):

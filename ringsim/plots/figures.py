@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ringsim.analysis.design import any_finite
+from ringsim.analysis.courses import any_finite
 from ringsim.choice import load_package
 from ringsim.files import writing
 from ringsim.plots import style

@@ -125,7 +125,8 @@ def known(path: str, others: list[str]) -> list[Found]:
         "ringsim explain lists the variables, ringsim explain scene and campaign the keys"
     )  # fmt: skip
     raise InputError(
-        f"{path}: neither a key of a scene or campaign nor a variable of a result ({hint})"
+        f"{path}: neither a key of a scene or campaign nor a variable of a result ({hint}); a "
+        "campaign's own outputs are told in its file, under [outputs]"
     )
 
 

@@ -19,6 +19,7 @@ from ringsim.analysis.design import (
     NOT_RUN,
     REACHED,
     UNKNOWN,
+    by_path,
     called,
     campaign_file,
     distribution_of,
@@ -102,10 +103,12 @@ def failures(
 
 def drawn_inputs(campaign: xr.Dataset) -> Rows:
     """Name, unit, places, distribution, the values that samples which have run have of it, and the
-    scene's paths that take them: a row an input.
+    scene's paths that take them: a row an input, then one for each path that follows an input.
     """
     rows, held = [], ran(campaign)
-    for name in inputs(campaign):
+    every = by_path(campaign)
+    followers = [name for name in every.values() if _leader(campaign, name)]
+    for name in [*inputs(campaign), *followers]:
         variable = campaign[name]
         law, values = law_text(distribution_of(variable)), variable.to_numpy()
         values = values[held] if held.any() else values
@@ -117,7 +120,8 @@ def drawn_inputs(campaign: xr.Dataset) -> Rows:
         places = variable.shape[1] if variable.ndim > 1 else 1
         unit = unit_text(str(variable.attrs.get("units", "-")))
         paths = ", ".join(paths_of(variable))
-        rows.append([called(variable), unit, str(places), law, extent, paths])
+        called_ = paths if name in followers else called(variable)
+        rows.append([called_, unit, str(places), law, extent, paths or "-"])
     return rows
 
 
@@ -156,7 +160,8 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
     called = str(campaign.attrs.get("campaign", ""))
     settings |= {BARS: True} if wanted.get("error_bars_every") else {}
     settings |= dict.fromkeys(re.findall(r"^# called with --set (\S+) =", called, re.MULTILINE))
-    drawn = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
+    varies = by_path(campaign)
+    drawn = [*varies]
     text = builtin_scenes().get(str(wanted.get("scene", "")), "")
     written, comments = flat(tomllib.loads(text)), _comments(text)
     rows, own = [], flat(tomllib.loads(str(campaign.attrs["scene"])))
@@ -164,6 +169,8 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
         comment, origin = comments.get(path, ""), "scene"
         if _under(path, drawn):
             origin = "drawn"
+            if leader := _leader(campaign, varies.get(path, "")):
+                comment = f"follows {leader}"
         elif _holds(path, drawn):
             origin = "drawn in part"
         elif _under(path, settings):
@@ -178,6 +185,12 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
     rows += [Value(path, "-", "drawn", "") for path in unset]
     head = re.match(r"(?:#.*\n)+", text)
     return rows, " ".join(re.sub(r"^# ?", "", head[0], flags=re.MULTILINE).split()) if head else ""
+
+
+def _leader(campaign: xr.Dataset, name: str) -> str:
+    """The input whose values decide about those of a variable by a table; empty if none does."""
+    law = distribution_of(campaign[name]) if name else {}
+    return called(campaign[name]) if law.get("kind") == "function" else ""
 
 
 def _remark(path: str, scene: Mapping[str, Any]) -> str:

@@ -561,7 +561,9 @@ def law_text(says: Mapping[str, Any]) -> str:
     ...           "standard_deviation": 1.0}, "shift": 0.5, "remaining_scatter": 0.1, "data": "A"})
     'median 2.5, 90 % in 2.336 .. 2.664 after A (before: normal, mean 2, standard deviation 1)'
     """
-    own = {key: value for key, value in says.items() if key not in ("shared", "each_section")}
+    own = {
+        key: value for key, value in says.items() if key not in ("shared", "each_section", "unit")
+    }
     if own.get("kind") == "calibrated":  # its numbers are those of a standard normal variable
         low, median, high = Calibrated.model_validate(own).quantile(np.array([0.05, 0.5, 0.95]))
         return (

@@ -41,6 +41,19 @@ def test_the_numerical_error_of_a_sample_that_is_named_stands_beside_its_value()
     assert sum("error_bars_every" in line for line in peak_lines(made)) == 1
 
 
+def test_another_worst_value_by_the_full_engine_stands_beside_it() -> None:
+    made = made_campaign(5)
+    where = {"time": [5.0] * 5, "plane": ["upper"] * 5, "span": [1] * 5}
+    made = made.assign({f"peak_tension_{k}": ("sample", v) for k, v in where.items()})
+    own = float(made["peak_tension"][4])
+    for other, told in ((1.5 * own, f"; {1.5 * own:.3g} N by the full engine"), (1.04 * own, "")):
+        checked = np.array([np.nan, 1.0, np.nan, np.nan, other])
+        lines = peak_lines(made.assign(peak_tension_checked=("sample", checked)))
+        (line,) = (line for line in lines if "tension in sample 4" in line)
+        assert line.endswith(told)
+        assert ("by the full engine" in line) == bool(told)
+
+
 def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     """Alike but for numbers and places; failed runs have reasons, and no remarks that count."""
     made = made_campaign(12, failed=(4,))
@@ -62,6 +75,12 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     lines = "\n".join(all_told(analyse(made)))
     assert " ".join(first.split()) in " ".join(lines.split())
     assert remark_lines(made_campaign(3)) == []
+    again = "reached (start 2 with solver.step = 0.1 s; start 1: too much energy (10 %): reduce it)"
+    once_more = made.assign(reason=("sample", np.array([again] + [reached] * 11, dtype=object)))
+    assert remark_lines(once_more) == [
+        "in 1 of 11 samples, for example in sample 0: first attempt: too much energy (10 %): "
+        "reduce it"
+    ]
     made["reason"] = "sample", np.array([f"{reached}; {latch}"] * 12, dtype=object)
     assert remark_lines(made) == [f"in all 11 samples, for example in sample 0: {latch}"]
 

@@ -67,6 +67,15 @@ def test_less_than_a_thousandth_is_worse_in_neither(share, worse):
     assert ("  second  " in f"{row}  ") == worse, row
 
 
+def test_outputs_that_one_has_alone_are_named():
+    own = seeded(VALUES).assign(peak_tension=("sample", 30.0 + VALUES))
+    lines = compared(compare(own, seeded(SHIFTED)))
+    assert (
+        sum(line.startswith("in first alone: ") and "peak_tension" in line for line in lines) == 1
+    )
+    assert not any("alone" in line for line in compared(compare(own, own)))
+
+
 def test_settings_of_the_solver_are_no_inputs_that_differ():
     bars = np.arange(COUNT) % 2.0
     first, second = seeded(VALUES), seeded(SHIFTED)

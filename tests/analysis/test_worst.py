@@ -77,7 +77,7 @@ def test_margins_to_limits_are_those_of_the_worst_sample_at_any_time() -> None:
     (row,) = margin_table(found).rows
     # A requirement on peak_tension, which ends with the last lock, would not see these 29 N.
     later = "cable_tension after the last lock, as recorded"
-    assert row == ("limits.tension = 30 N", later, "29 N", "+0.0345", "2")
+    assert row == ("limits.tension = 30 N", later, "29 N", "+0.0345", "2", "0 of 7")
     assert "limits.tension = 30 N" in "\n".join(verdict_lines(made))
     assert not margin_table(analyse(made_campaign(8))).rows
 
@@ -88,8 +88,12 @@ def test_a_limit_that_is_passed_and_a_margin_that_is_short_are_told_above_the_ve
     lines = told(analyse(made, wanted))
     (passed,) = (k for k, line in enumerate(lines) if line.startswith("limits.tension = 20 N"))
     (short,) = (k for k, line in enumerate(lines) if line.startswith("least_drive_margin >= 0"))
-    assert lines[passed].split()[-4:] == ["-0.259:", "NOT", "enough", "7"]  # 20 / 27 - 1
-    assert lines[short].split()[-4:] == ["-0.4:", "NOT", "enough", "1"]
+    # 20 / 27 - 1; all but the lost one are beyond.
+    assert lines[passed].split()[-7:] == ["-0.259:", "NOT", "enough", "7", "7", "of", "7"]
+    least = made["least_drive_margin"].values[1:]
+    assert lines[short].split()[-7:] == [
+        "-0.4:", "NOT", "enough", "1", str((least < 0.0).sum()), "of", "7"
+    ]  # fmt: skip
     assert max(passed, short) < next(k for k, line in enumerate(lines) if "verdict" in line)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from ringsim.analysis.posterior import (
     FALSE_ALARM,
@@ -16,6 +17,7 @@ from ringsim.analysis.posterior import (
     learn,
     posterior_of,
     rank,
+    sensors_table,
 )
 
 pytestmark = pytest.mark.quick
@@ -246,3 +248,14 @@ def test_sensors_come_in_the_order_of_what_they_leave():
     assert found.order[1] == min(second, key=second.get)
     for k in range(count):
         np.testing.assert_allclose(found.after[k], left(found.order[: k + 1]), rtol=1e-6)
+
+
+def test_sensors_that_seem_to_take_knowledge_away_are_named():
+    left = np.array([[0.5, 0.4], [0.3, 0.4], [0.4, 0.4]])
+    plan = xr.Dataset(
+        {"learnt": (("sensor", "unknown"), left), "alone": (("sensor", "unknown"), left)},
+        {"sensor": ["a", "b", "c"], "unknown": ["p", "q"]},
+    )
+    (told,) = (note for note in sensors_table(plan).notes if "too few runs" in note)
+    assert told.endswith("as no sensor can: c: raise runs")
+    assert not any("too few" in note for note in sensors_table(plan.isel(sensor=[0, 1])).notes)

@@ -9,8 +9,8 @@ from made_campaign import SECTIONS, TIMES, lags, made_campaign, with_motors
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ringsim.analysis import courses as blocks_module
 from ringsim.analysis import courses as courses_module
-from ringsim.analysis import design as blocks_module
 from ringsim.analysis.comparison import compare
 from ringsim.analysis.courses import course, courses
 from ringsim.analysis.design import median_and_worst

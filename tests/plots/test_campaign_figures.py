@@ -14,7 +14,7 @@ from made_campaign import made_campaign, with_motors
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ringsim.analysis import design as blocks_module
+from ringsim.analysis import courses as blocks_module
 from ringsim.analysis.design import median_and_worst, scalars
 from ringsim.analysis.intervals import is_moment, quantities
 from ringsim.analysis.study import analyse

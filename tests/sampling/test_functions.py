@@ -12,6 +12,7 @@ import ringsim
 from ringsim import InputError
 from ringsim.analysis.design import called, inputs
 from ringsim.campaign.specification import campaign_of
+from ringsim.report import page
 
 TABLE = [[200.0, 9e4], [250.0, 1.0e5], [320.0, 1.4e5]]
 INPUTS: dict[str, Any] = {
@@ -54,6 +55,20 @@ def test_they_are_their_tables_of_what_was_drawn(tmp_path: Path) -> None:
     })  # fmt: skip
     own = ringsim.simulate(scene, fidelity="frame")
     assert own["peak_tension"].item() == found["peak_tension"].values[5]
+    values = {each.path: each for each in page.values_of(found)[0]}
+    assert (values["joints.vjoint.viscous"].origin, values["joints.vjoint.viscous"].comment) == (
+        "drawn", "follows lot",
+    )  # fmt: skip
+    assert "temperature" not in values
+    rows = {row[0]: row for row in page.drawn_inputs(found)}
+    assert [*rows] == ["temperature", "lot", *(path for path in INPUTS if "." in path)]
+    assert (rows["temperature"][1], rows["temperature"][-1]) == ("K", "-")
+    assert rows["cables.lower.axial_stiffness"][4] == " to ".join(
+        f"{end:.5g}" for end in (lower.min(), lower.max())
+    )
+    plan = given.plan(out=tmp_path / "p")
+    assert "cables.lower.axial_stiffness: " in plan
+    assert "N, follows temperature" in plan
     told = ringsim.analyse(found)
     with pytest.raises(InputError, match="follows another input"):
         ringsim.analyse(found, reweighted={"temperature": INPUTS["cables.lower.axial_stiffness"]})

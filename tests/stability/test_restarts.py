@@ -142,7 +142,7 @@ def test_a_campaign_says_how_many_samples_started_anew() -> None:
     counts = {"restarts": [0, 2, 1, -1], "steps": [10, 40, 20, -1], "total_steps": [10, 70, 40, -1]}
     whole = xr.Dataset({name: ("sample", np.array(n)) for name, n in counts.items()})
     (line,) = restart_lines(whole)
-    assert line.startswith("2 of 4 samples were restarted")
+    assert line.startswith("2 of 3 samples were restarted")  # of those that have run
     assert "42% of all 120 steps" in line  # (30 + 20) of 120
     assert restart_lines(whole.isel(sample=[0, 3])) == []
 

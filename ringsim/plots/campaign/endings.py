@@ -10,13 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ringsim.analysis.courses import ends, names_of_ends
+from ringsim.analysis.courses import blocks, ends, names_of_ends
 from ringsim.analysis.design import (
-    blocks,
+    by_path,
     endings,
-    inputs,
     judged_by,
-    paths_of,
     told,
     values_of,
 )
@@ -287,7 +285,7 @@ def motors(campaign: xr.Dataset) -> Figure:
 @picture("campaign", 72, "Opening rate of each V-joint at its latch", ("latch_rate",))
 def latch_rate(campaign: xr.Dataset) -> Figure:
     """Bands of ``latch_rate`` (sample, plane, section); the least rate at which latches catch."""
-    paths = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
+    paths = by_path(campaign)
     drawn = any(path.startswith(("latch.min_rate", "latch[")) or path == "latch" for path in paths)
     least = np.nan if drawn else least_rate(campaign)
     return _by_joint(campaign, "latch_rate", "Latch rates", least)
