@@ -1,6 +1,7 @@
 """Refusing bad input: one clear line, naming field, value, bound and cure; and how commands end."""
 
 import difflib
+import math
 import re
 import typing
 from collections.abc import Iterable, Iterator
@@ -194,6 +195,10 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     )  # fmt: skip
     if unit == " K" and number and -272.15 <= value <= 0.0:
         return f"{line}; {value:g} C are {value + 273.15:g} K"
+    if unit == " m" and number and value > limits.get("le", math.inf):
+        return f"{line}; {value:g} mm are {1e-3 * value:g} m"
+    if unit == " Pa" and number and 0.0 < value < limits.get("ge", 0.0):
+        return f"{line}; {value:g} GPa are {1e9 * value:g} Pa"
     if number and 1.0 < value <= 100.0 and limits.get("lt", limits.get("le")) == 1.0:
         return f"{line}; {value:g} % are {value / 100.0:g}"
     if not isinstance(value, str):

@@ -249,7 +249,8 @@ def test_what_is_not_told_and_why():
     note = next(line for line in told(found) if line.startswith("changes that were not"))
     assert note == (
         "changes that were not tried: idle, pair (correlated with another input); flat (the mean: "
-        "no samples beyond the bounds); learnt (without a mean and a standard deviation of its own); listed (listed "
+        "no samples beyond the bounds); learnt (without a mean and a standard deviation of its "
+        "own); listed (listed "
         "in a file)"
     )
     # All bounds, and a limit that hardly any sample violates.
