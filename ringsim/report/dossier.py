@@ -317,7 +317,7 @@ item(ECSS, "4.4.2 Mechanism function", "The motion over time, and its tolerances
 
 @item(ECSS, "4.7.4.2, 4.8.2.3 Thermal design", "It works at all temperatures and gradients.")
 def _temperature(of: Of) -> Answer:
-    found = Answer(_drawn(of, lambda _, unit: unit == "K"))
+    found = Answer(_drawn(of, lambda path, unit: unit == "K" or path.startswith("temperature.")))
     for path, values in of.scene.items():
         if path.startswith("temperature.") and path.endswith(".temperatures"):
             known = f"{path.removesuffix('.temperatures')} for {values[0]:g} to {values[-1]:g} K"
