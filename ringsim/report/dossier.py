@@ -185,8 +185,8 @@ def write_dossier(campaign: xr.Dataset, out: Path, folder: str) -> tuple[int, li
     head = [
         *head_lines(analysis),
         f"computed by {says.get('source', 'unknown')}; commit {says.get('git_commit', 'unknown')}, "
-        f"sources {says.get('sources', 'unknown')}; any sample k again: "
-        f"{command(folder, 0)[:-1]}k",
+        f"sources {says.get('sources', 'unknown')}",
+        f"any sample k again: {command(folder, 0)[:-1]}k",
         f"{counted(counts.total(), 'clause')}: {told}", _MEANS,
     ]  # fmt: skip
     context = {
@@ -358,8 +358,8 @@ def _strength(of: Of) -> Answer:
 
 @item(
     ECSS, "4.7.5.3, 4.8.2.8 Functional dimensioning (motorization)",
-    "At every position the drive is at least the sum of all resistances, each times its factor; "
-    "momentum does not count.",
+    "At every position the drive is at least twice the sum of all resistances, each times its "
+    "factor; momentum does not count.",
 )  # fmt: skip
 def _drive(of: Of) -> Answer:
     name, kind, wanted = "least_drive_margin", of.scene.get("margin.kind"), "ecss-e-st-33-01c"
@@ -386,7 +386,7 @@ def _drive(of: Of) -> Answer:
     return found + _verdicts(of, name)
 
 
-@item(ECSS, "4.7.5.4.3 Latching", "Latches catch at all temperatures and with all tolerances.")
+@item(ECSS, "4.7.5.4.3 Latching or locking", "Latches catch at all temperatures and tolerances.")
 def _latching(of: Of) -> Answer:
     found = outputs(latched_joints="stop.latch = true", least_latch_rate="")(of)
     if found.result:
@@ -398,7 +398,7 @@ def _latching(of: Of) -> Answer:
     return found + _verdicts(of, "latched_joints", "least_latch_rate")
 
 
-item(ECSS, "4.7.5.4.3 i, 4.7.5.4.4, 4.8.2.11 Shock", "Shock loads of latches and end stops.")(
+item(ECSS, "4.7.5.4.3 i, 4.7.5.4.4 End stops, 4.8.2.11 Shock", "Shocks of latches and stops.")(
     outputs(
         peak_latch_rate="stop.latch = true",
         peak_lock_impulse=f"{_REACTIONS}, with stops",

@@ -217,7 +217,7 @@ def test_every_number_is_that_of_the_file(stored: tuple[File, xr.Dataset]) -> No
 def test_what_a_campaign_lacks_is_missing_with_its_cure() -> None:
     """Neither motors, latches, allowables, temperatures nor a test."""
     ecss, nasa = rows_of(made_campaign()), rows_of(made_campaign(), NASA)
-    lacking = ("Thermal design", "Loads", "motorization)", "Latching", "Shock", "Test",
+    lacking = ("Thermal design", "Loads", "motorization)", "Latching or locking", "Shock", "Test",
                "Tolerance budget", "Other analyses")  # fmt: skip
     for own in (row(ecss, clause) for clause in lacking):
         assert own["state"] == "not analysed"
