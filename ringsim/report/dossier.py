@@ -22,7 +22,7 @@ from ringsim.analysis.engines import differences, verdict
 from ringsim.analysis.influence_text import what_matters
 from ringsim.analysis.intervals import CHECKED, good, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
-from ringsim.analysis.study import analyse
+from ringsim.analysis.study import SOURCES, analyse
 from ringsim.analysis.study_text import (
     error_tables,
     head_lines,
@@ -250,12 +250,13 @@ def _evidence(of: Of, name: str) -> str:
     cell, unit = _cells(of.errors, name), unit_of(of.analysis, name)[1]
     words = [f"{used} of {used + lost + absent} samples"]
     for most, count, told in (
-        ("largest bar", "samples with bars", "error bars"),
-        ("largest difference", "samples checked", "differences of the engines"),
+        ("largest bar", "samples with bars", "error bar"),
+        ("largest difference", "samples checked", "engine difference"),
     ):
         if cell.get(most, "-") != "-":
             number, _, where = cell[most].partition(" ")
-            words.append(f"largest of {cell[count]} {told} {with_unit(number, unit)} {where}")
+            of_all = "largest of " * (cell[count] != "1") + counted(int(cell[count]), told)
+            words.append(f"{of_all}: {with_unit(number, unit)} {where}".rstrip())
     return "; ".join(words)
 
 
@@ -310,11 +311,6 @@ def _reliability(of: Of) -> Answer:
     return found + shown
 
 
-item(ECSS, "4.4.2 Mechanism function", "The motion over time, and its tolerances.")(
-    outputs(deployment_time="no sample has deployed", asynchrony_max="no angle was recorded")
-)
-
-
 @item(ECSS, "4.7.4.2, 4.8.2.3 Thermal design", "It works at all temperatures and gradients.")
 def _temperature(of: Of) -> Answer:
     found = Answer(_drawn(of, lambda path, unit: unit == "K" or path.startswith("temperature.")))
@@ -326,16 +322,6 @@ def _temperature(of: Of) -> Answer:
         cure = "draw temperature.joint.value or temperature.pulley.value under [inputs]"
         found.lacks["scatter of temperatures"] = cure
     return found
-
-
-_REACTIONS = "record.reactions = true"
-item(ECSS, "4.7.5.2.2, 4.8.2.12 Loads", "Loads and motion of the spacecraft from the dynamics.")(
-    outputs(
-        peak_base_force=_REACTIONS,
-        peak_base_torque=_REACTIONS,
-        base_rotation_max=f'[spacecraft], boom.base = "free", {_REACTIONS}',
-    )
-)
 
 
 _ALLOWABLES = {"peak_tension": "limits.tension", "peak_rod_stress": "limits.rod_stress"}
@@ -398,15 +384,6 @@ def _latching(of: Of) -> Answer:
     return found + _verdicts(of, "latched_joints", "least_latch_rate")
 
 
-item(ECSS, "4.7.5.4.3 i, 4.7.5.4.4 End stops, 4.8.2.11 Shock", "Shocks of latches and stops.")(
-    outputs(
-        peak_latch_rate="stop.latch = true",
-        peak_lock_impulse=f"{_REACTIONS}, with stops",
-        peak_acceleration_max="record.accelerations = true",
-    )
-)
-
-
 @item(ECSS, "4.8.2.1 Cases", "Extremes together, and what the ground changes: weight, test rig.")
 def _cases(of: Of) -> Answer:
     kind, found = of.analysis.attrs["design"], Answer()
@@ -426,10 +403,8 @@ def _cases(of: Of) -> Answer:
 
 @item(ECSS, "4.8.2.2 Worst-case identification", "Which cases size the mechanism.")
 def _worst(of: Of) -> Answer:
-    told = [
-        f"{each.title}: worst sample {each.rows[0][0]}, {each.rows[0][1]}; {each.rows[0][2]}"
-        for each in worst_tables(of.analysis, "")
-    ]
+    rows = ((each.title, *each.rows[0]) for each in worst_tables(of.analysis, ""))
+    told = [f"{what}: worst sample {k}, {value}; inputs: {odd}" for what, k, value, odd, _ in rows]
     none = "no sample fails or violates a requirement; worst samples of outputs stand above"
     return Answer(told or [none] * bool(of.analysis.attrs["samples_run"]))
 
@@ -485,24 +460,19 @@ def _sensitivity(of: Of) -> Answer:
     table = what_matters(of.analysis)
     wanted = [line.partition(":")[0] for line in _verdicts(of).evidence]
     rows = [row for row in table.rows if row[0]]
-    own = [row for row in rows if row[0] in wanted] or rows[:_SHOWN]
-    found = Answer([f"{row[0]} most by {row[1]}: {_measures(table.head, row)}" for row in own])
-    if rows:
-        found.evidence.append(f"{counted(len(rows), 'output')} with an input beyond chance")
+    plain = [row for row in rows if row[0] in quantities() and quantities()[row[0]].summary]
+    own = [row for row in rows if row[0] in wanted] or (plain or rows)[:_SHOWN]
+    cells = [(row, zip(table.head[2:], row[2:], strict=True)) for row in own]
+    found = Answer([
+        f"{row[0]} most by {row[1]}: "
+        + ", ".join(f"{head} {cell}" for head, cell in each if cell not in ("", "-"))
+        for row, each in cells
+    ])  # fmt: skip
+    found.evidence += ["ringsim analyse --full lists all outputs and inputs"] * bool(rows)
     found.evidence += [note for note in table.notes if note.startswith("no significant")]
     if not rows:
         found.lacks["effects beyond chance"] = "more samples, or inputs that scatter"
     return found
-
-
-def _measures(head: Iterable[str], row: Iterable[str]) -> str:
-    told = list[str]()
-    for name, cell in list(zip(head, row, strict=True))[2:]:
-        if name == "95 % interval" and told and cell not in ("", "-"):
-            told[-1] += f" ({cell})"
-        elif cell not in ("", "-"):
-            told.append(f"{name} {cell}")
-    return ", ".join(told)
 
 
 @item(ECSS, "4.8.2.6.3 e, f Test", "Differences of test and prediction are explained.")
@@ -510,14 +480,6 @@ def _measures(head: Iterable[str], row: Iterable[str]) -> str:
 def _validation(of: Of) -> Answer:
     cure = "ringsim compare DIR TEST.toml and ringsim report --measured lay them beside the samples"
     return Answer(learnt_lines(of.campaign), lacks={"readings of a test": cure})
-
-
-@item(
-    ECSS, "4.8.2.7, 4.8.2.10, 4.8.2.13 to 4.8.2.19 Other analyses",
-    "Contact stress, gears, control, lubrication, life, humidity, magnets, radiation, electrics.",
-)  # fmt: skip
-def _others(_: Of) -> Answer:
-    return Answer(lacks={"all of these": "other tools; 4.8.2.1 b asks why one is left out"})
 
 
 # NASA-STD-7009.
@@ -570,16 +532,14 @@ def _uncertainty(of: Of) -> Answer:
     else:
         found.lacks["intervals"] = says["intervals"] or "more samples"
     found.evidence.append(f"{says['samples_run']} of {says['samples']} samples have run")
-    sources = {name: _cells(of.errors, name).get("dominates", "-") for name in quantities()}
-    told = [f"{name} by {source}" for name, source in sources.items() if source != "-"]
-    found.evidence += [f"largest part of the error of the mean: {', '.join(told)}"] * bool(told)
+    largest = dict[str, list[str]]()
+    for name in quantities():
+        if source := _cells(of.errors, name).get("dominates", "-").partition(" ")[0].strip("-"):
+            largest.setdefault(source, []).append(name)
+    for source, names in largest.items():
+        told = counted(len(names), "output") if source == SOURCES[0] else ", ".join(names)
+        found.evidence.append(f"largest part of the error of the mean is {source}: {told}")
     return found
-
-
-@item(NASA, "factor 6, use history (second-hand)", "Whether the model served like cases before.")
-@item(NASA, "factor 8, people (second-hand)", "Whether those who ran and judge it are qualified.")
-def _by_hand(_: Of) -> Answer:
-    return Answer(lacks={"all": "a campaign holds nothing of it: state it by hand"})
 
 
 @item(NASA, "factor 7, management (second-hand)", "Which model ran, and whether it can run again.")
@@ -592,3 +552,30 @@ def _management(of: Of) -> Answer:
     if not re.fullmatch("[0-9a-f]+", says.get("git commit", "")):
         found.lacks["a commit that holds all that ran"] = "commit changes before a campaign"
     return found
+
+
+# Clauses that outputs alone answer, and those of which no campaign holds anything.
+
+
+_REACTIONS = "record.reactions = true"
+for _clause, _asks, _cures in (
+    ("4.4.2 Mechanism function", "The motion over time, and its tolerances.",
+     {"deployment_time": "no sample has deployed", "asynchrony_max": "no angle was recorded"}),
+    ("4.7.5.2.2, 4.8.2.12 Loads", "Loads and motion of the spacecraft from the dynamics.",
+     {"peak_base_force": _REACTIONS, "peak_base_torque": _REACTIONS,
+      "base_rotation_max": f'[spacecraft], boom.base = "free", {_REACTIONS}'}),
+    ("4.7.5.4.3 i, 4.7.5.4.4 End stops, 4.8.2.11 Shock", "Shocks of latches and stops.",
+     {"peak_latch_rate": "stop.latch = true", "peak_lock_impulse": f"{_REACTIONS}, with stops",
+      "peak_acceleration_max": "record.accelerations = true"}),
+):  # fmt: skip
+    item(ECSS, _clause, _asks)(outputs(**_cures))
+
+
+@item(NASA, "factor 6, use history (second-hand)", "Whether the model served like cases before.")
+@item(NASA, "factor 8, people (second-hand)", "Whether those who ran and judge it are qualified.")
+@item(
+    ECSS, "4.8.2.7, 4.8.2.10, 4.8.2.13 to 4.8.2.19 Other analyses",
+    "Contact stress, gears, control, lubrication, life, humidity, magnets, radiation, electrics.",
+)  # fmt: skip
+def _not_here(_: Of) -> Answer:
+    return Answer(lacks={"all of it": "no campaign holds it: by other means, or say why not"})

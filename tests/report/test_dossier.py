@@ -22,7 +22,7 @@ from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.report import dossier as subject
 from ringsim.report import shell
 from ringsim.report.dossier import ECSS, HEAD, NASA, STATES, Answer, Of, dossier, item
-from test_numbers_told import made, near
+from test_numbers_told import COUNT, made, near
 from told_numbers import (
     File,
     agrees,
@@ -153,6 +153,21 @@ def summed(file: File, said: re.Match[str]) -> None:
     assert sum(parts) == int(said["count"])
 
 
+def held(file: File, said: re.Match[str]) -> None:
+    assert int(said["count"]) == int(file.ok.sum())
+
+
+def complete(file: File, said: re.Match[str]) -> None:
+    assert {int(said["count"]), int(said["of"])} == {COUNT}
+
+
+def sampling(file: File, said: re.Match[str]) -> None:
+    """Of outputs that have error bars, which err alike: their root mean square."""
+    values, bars = file.of("peak_tension"), file.of("peak_tension_error")
+    less = np.sqrt(np.mean(bars**2)) < values.std(ddof=1) / np.sqrt(len(values))
+    assert int(said["count"]) == int(less) == 1
+
+
 def anything(file: File, said: re.Match[str]) -> None:
     """Words without a number of the samples: names, laws, versions, the scene's own values."""
 
@@ -169,7 +184,7 @@ KNOWN = {
     r"(?P<name>\w+): (?P<bad>\d+) of (?P<of>\d+) samples violate it(?:, (?P<lost>\d+) failed)?"
     r"(?:; \d+ more without a violation would prove it)?": violating,
     r"(?:(?P<names>[\w, ]+): )?(?P<count>\d+) of (?P<of>\d+) samples(?:; largest of (?P<bars>\d+) "
-    rf"error bars (?P<bar>{N}) N \(sample (?P<sample>\d+)\))?": samples,
+    rf"error bars: (?P<bar>{N}) N \(sample (?P<sample>\d+)\))?": samples,
     rf"in sample (?P<sample>\d+) it is least at (?P<angle>{N}) deg, (?P<time>{N}) s": place,
     r"below 0 in (?P<count>\d+) of (?P<of>\d+) samples(?P<not>: NOT enough)?": short,
     rf"(?P<name>.*imbalance.*): median (?P<median>{N}), largest (?P<most>{N}) "
@@ -181,7 +196,9 @@ KNOWN = {
     rf"(?P<name>[\w.]+): uniform, low 0, high 1; drawn: (?P<low>{N}) to (?P<high>{N}) m": drawn,
     r"(?P<count>\d+) values: (?P<parts>.+)": summed,
     r"(peak_tension): largest of .*": anything,  # as in its row
-    r"\d+ samples|\d+ of \d+ samples have run|\d+ outputs? with an input beyond chance": anything,
+    r"(?P<count>\d+) samples": held,
+    r"(?P<count>\d+) of (?P<of>\d+) samples have run": complete,
+    r"largest part of the error of the mean is sampling: (?P<count>\d+) outputs?": sampling,
     r"95 % intervals: .*|\d+ of \d+ runs failed, .*": anything,
     r"static margin at all angles passed.*|(sources|identity|ringsim version|git commit|seed) .*|"
     r"(python|exudyn) version .*": anything,
@@ -286,7 +303,7 @@ def test_both_engines_are_told_apart() -> None:
     apart = 0.25 + 0.25 * (np.arange(8) == 4)
     campaign["peak_tension_checked"] = own["peak_tension"].where(checked) + apart
     strength = row(rows_of(campaign), "Margin of safety")["evidence"]
-    assert "largest of 2 differences of the engines 0.5 N (sample 4)" in strength
+    assert "largest of 2 engine differences: 0.5 N (sample 4)" in strength
     sure = row(rows_of(campaign, NASA), "verification (second-hand)")
     assert "2 samples answered by both engines" in sure["evidence"]
     assert "check_every" not in sure["result"]
