@@ -218,7 +218,9 @@ def outputs(**cures: str) -> Ask:
                 found.result.append(_output(of, name))
                 evidence.setdefault(_evidence(of, name), []).append(name)
             elif cure:
-                found.lacks[name] = cure
+                key = re.match(r"([\w.]+) = true", cure)
+                there = key is not None and of.scene.get(key[1]) is True
+                found.lacks[name] = "no sample has a value" if there else cure
         for told, names in evidence.items():
             found.evidence.append(f"{', '.join(names)}: " * (len(evidence) > 1) + told)
         return found
@@ -487,10 +489,10 @@ def _validation(of: Of) -> Answer:
 
 @item(NASA, "factor 1, verification (second-hand)", "How large numerical errors are.")
 def _verification(of: Of) -> Answer:
-    found, told = _integrity(of), {name: _cells(of.errors, name) for name in quantities()}
-    barred = [name for name, cell in told.items() if cell.get("largest bar", "-") != "-"]
-    found.result += [f"{name}: {_evidence(of, name).partition('; ')[2]}" for name in barred]
-    if not barred:
+    found, own = _integrity(of), [name for name, each in quantities().items() if each.summary]
+    told = {name: _evidence(of, name).partition("; ")[2] for name in own if name in of.analysis}
+    found.result += [f"{name}: {errors}" for name, errors in told.items() if errors]
+    if not any("bar" in errors for errors in told.values()):
         found.lacks["numerical error bars"] = "error_bars_every"
     if f"status{CHECKED}" not in of.campaign:
         found.lacks["the other engine"] = "check_every"

@@ -250,6 +250,18 @@ def test_what_a_campaign_lacks_is_missing_with_its_cure() -> None:
 
 
 @pytest.mark.quick
+def test_a_key_that_is_set_is_no_cure() -> None:
+    campaign = made_campaign(4)
+    said = "Missing: peak_base_force (record.reactions = true)"
+    assert said in row(rows_of(campaign), "Loads")["result"].splitlines()
+    campaign.attrs["scene"] = re.sub(
+        "reactions = false", "reactions = true", campaign.attrs["scene"]
+    )
+    said = "Missing: peak_base_force (no sample has a value)"
+    assert said in row(rows_of(campaign), "Loads")["result"].splitlines()
+
+
+@pytest.mark.quick
 def test_every_key_of_a_cure_exists() -> None:
     known = {*tree.paths("scene"), *tree.paths("campaign")}
     text = "\n".join(
