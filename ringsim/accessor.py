@@ -184,6 +184,24 @@ class Ring:
                     found[table.title or table.head[0]] = rows
         return found
 
+    def dossier(self) -> "dict[str, pd.DataFrame]":
+        """What ``ringsim dossier`` tells of a campaign, by standard: a row a clause, with what it
+        asks, whether it is analysed, the result and its evidence; how the standard is known is
+        ``notes`` among the ``attrs``.
+
+        InputError if it is no campaign, or its requirements cannot be judged.
+        """
+        import pandas as pd
+
+        from ringsim.report.dossier import dossier
+
+        self._require_samples("a dossier")
+        found = {}
+        for table in dossier(self._dataset):
+            found[table.title] = pd.DataFrame(table.rows, columns=table.head)
+            found[table.title].attrs["notes"] = list(table.notes)
+        return found
+
     def worst(self) -> "pd.DataFrame":
         """The worst samples of each failure of a campaign, the worst first: of requirements of its
         file that are violated, of outcomes that fall short, of runs that were lost.

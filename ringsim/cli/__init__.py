@@ -30,6 +30,7 @@ VERBS = {
     "merge": "Write the results of a campaign so far to one file.",
     "analyse": "Analyse a campaign: requirements, statistics with intervals, errors.",
     "report": "Write one HTML page about a campaign: outcomes, figures, failures, model.",
+    "dossier": "List what a campaign shows of the clauses that a review asks for.",
     "compare": "Compare two campaigns, or two runs.",
     "replay": "Run one sample of a campaign again.",
     "calibrate": "Find unknown inputs from measured data.",
@@ -45,7 +46,7 @@ _FILES = {
     "run": ("run",),
     "studies": ("modes", "accuracy", "stability", "calibrate", "sensors", "optimise"),
     "campaign": ("campaign", "status", "replay"),
-    "results": ("merge", "analyse", "report", "plot", "compare", "export"),
+    "results": ("merge", "analyse", "report", "dossier", "plot", "compare", "export"),
 }
 """Files of ``ringsim.cli`` and their verbs: only that of the verb which is called is imported."""
 

@@ -1,4 +1,4 @@
-"""``ringsim merge``, ``analyse``, ``report``, ``plot``, ``compare`` and ``export``."""
+"""``ringsim merge``, ``analyse``, ``report``, ``dossier``, ``plot``, ``compare``, ``export``."""
 
 from pathlib import Path
 from typing import Any
@@ -166,6 +166,30 @@ def report_command(
     with opened(folder) as campaign:
         file = folder / MERGED if folder.is_dir() else folder
         size = _write(campaign, file, out, analysis, measured)
+    _told_page(out, size, pdf=pdf)
+
+
+@click.command()
+@click.argument("folder", metavar="DIR", type=PATH)
+@click.option("--out", metavar="FILE", type=PATH, default=Path("dossier.html"), show_default=True)
+@click.option("--pdf", is_flag=True, help="Also write a PDF of the same name (needs chromium).")
+def dossier_command(folder: Path, out: Path, *, pdf: bool) -> None:
+    """List what the campaign in DIR, or in a file campaign.nc, shows of each clause of the
+    standards ECSS-E-ST-33-01C and NASA-STD-7009: the numbers, their evidence, and what is missing.
+
+    The same is written as a page that loads nothing: it can be mailed, printed and kept.
+    """
+    from ringsim.report.dossier import write_dossier
+
+    _require_page("--out", out, pdf=pdf)
+    with opened(folder) as campaign:
+        try:
+            own = folder if folder.is_dir() else folder.parent
+            size, told = write_dossier(campaign, out, str(own))
+        except InputError as error:
+            raise InputError(f"{folder}: {error}") from None
+    for line in told:
+        click.echo(line)
     _told_page(out, size, pdf=pdf)
 
 

@@ -13,8 +13,7 @@ from ringsim.choice import kind_of
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
 from ringsim.outputs.family import Array
-from ringsim.plots import style
-from ringsim.plots.registry import picture
+from ringsim.plots import picture, style
 from ringsim.plots.run import mark, peak_of
 from ringsim.scene import Scene, scene_from_toml
 

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from ringsim.analysis.courses import any_finite
 from ringsim.choice import load_package
 from ringsim.files import writing
-from ringsim.plots import style
-from ringsim.plots.registry import NO_JOINTS, Picture, barred, jointed, known
+from ringsim.plots import NO_JOINTS, Picture, barred, jointed, known, style
 
 load_package("ringsim.plots")
 PICTURES = tuple(sorted(known.values(), key=lambda each: (each.of, each.place)))

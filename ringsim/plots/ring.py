@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
-from ringsim.plots import style
-from ringsim.plots.registry import jointed, picture
+from ringsim.plots import jointed, picture, style
 from ringsim.plots.run import Peak, peak_of
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import Shape, Track, places_at, shape_of

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ringsim.cable.records import Cable
 from ringsim.layout.bodies import JointOpening, OnRod
 from ringsim.layout.layout import layout_of
-from ringsim.plots import style
-from ringsim.plots.registry import barred, jointed, picture
+from ringsim.plots import barred, jointed, picture, style
 from ringsim.plots.run import mark, peak_of
 from ringsim.scene import Scene, scene_from_toml
 

@@ -13,8 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from ringsim.outputs.family import Array
-from ringsim.plots import style
-from ringsim.plots.registry import jointed, picture
+from ringsim.plots import jointed, picture, style
 from ringsim.tables import known_to, unit_text, with_unit
 
 # The largest value of a run as a point of what is drawn: records stand at fixed times, so that

@@ -16,9 +16,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from ringsim import plots
 from ringsim.dataset import to_dataset
 from ringsim.outputs import VARIABLES
-from ringsim.plots import figures, registry, style
+from ringsim.plots import figures, style
 from ringsim.plots.figures import PICTURES, draw_figures, figures_of, left_out, names_for
 from ringsim.plots.ring import ring
 from ringsim.plots.rods_and_cables import default_sections, rod_stress
@@ -431,12 +432,12 @@ def test_a_structure_without_joints_between_rods_is_told_what_is_not_drawn(
 
 
 def test_a_figure_is_one_entry(deployed: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "known", dict(registry.known))
+    monkeypatch.setattr(plots, "known", dict(plots.known))
 
-    @registry.picture("run", 15, "Nothing", ("asynchrony",))
+    @plots.picture("run", 15, "Nothing", ("asynchrony",))
     def nothing(run: xr.Dataset) -> Figure:
         return Figure()
 
-    made = registry.known["run", "nothing"]
+    made = plots.known["run", "nothing"]
     monkeypatch.setattr(figures, "PICTURES", (made, *figures.PICTURES))
     assert next(figures_of(deployed))[0] is made

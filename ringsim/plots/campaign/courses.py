@@ -15,7 +15,7 @@ from ringsim.analysis.courses import Courses, course, courses
 from ringsim.analysis.design import judged_by, median_and_worst, told
 from ringsim.analysis.intervals import good
 from ringsim.outputs.family import Array
-from ringsim.plots import style
+from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
     base_of,
     entries,
@@ -27,7 +27,6 @@ from ringsim.plots.campaign.frame import (
     of_cases,
     shown_until,
 )
-from ringsim.plots.registry import picture
 from ringsim.plots.run import LEAST_SPAN
 
 _NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")

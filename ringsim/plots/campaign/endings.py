@@ -20,7 +20,7 @@ from ringsim.analysis.design import (
 )
 from ringsim.analysis.intervals import good, used
 from ringsim.outputs.family import Array
-from ringsim.plots import style
+from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
     bands,
     head,
@@ -35,7 +35,6 @@ from ringsim.plots.campaign.frame import (
     shown_until,
 )
 from ringsim.plots.drives_and_locks import drive_end, least_rate, standard_of
-from ringsim.plots.registry import picture
 from ringsim.tables import counted as number_of
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.

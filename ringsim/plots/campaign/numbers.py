@@ -29,7 +29,7 @@ from ringsim.analysis.requirements import OUTCOME, Requirement, required_by, vio
 from ringsim.analysis.tails import approach, subset_simulation, tail
 from ringsim.analysis.verdicts import judge
 from ringsim.outputs.family import VARIABLES, Array
-from ringsim.plots import style
+from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
     MOST_PANELS,
     WIDE,
@@ -44,7 +44,6 @@ from ringsim.plots.campaign.frame import (
     standing,
 )
 from ringsim.plots.campaign.tornado import is_one_by_one
-from ringsim.plots.registry import picture
 from ringsim.tables import unit_behind, with_unit
 
 _LEVELS = [0.05, 0.5, 0.95]

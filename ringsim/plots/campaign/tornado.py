@@ -30,7 +30,7 @@ from ringsim.analysis.requirements import required_by
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import one_at_a_time
-from ringsim.plots import style
+from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
     drawable,
     head,
@@ -41,7 +41,6 @@ from ringsim.plots.campaign.frame import (
     short,
     still,
 )
-from ringsim.plots.registry import picture
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted, unit_behind
 

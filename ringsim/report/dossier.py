@@ -1,0 +1,585 @@
+"""The verification dossier: what a campaign holds of what a review of a mechanism asks for.
+
+One subject is one function below, with ``@item`` for each clause that it answers; nothing else
+knows it.
+"""
+
+import re
+import textwrap
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from ringsim.analysis.campaign_notes import LATE, MARK, NOTE, doubted, off_note
+from ringsim.analysis.design import REACHED, learnt_lines
+from ringsim.analysis.engines import differences, verdict
+from ringsim.analysis.influence_text import what_matters
+from ringsim.analysis.intervals import CHECKED, good, numbers, quantities
+from ringsim.analysis.requirements import OUTCOME
+from ringsim.analysis.study import SOURCES, analyse
+from ringsim.analysis.study_text import (
+    error_tables,
+    head_lines,
+    outcome_table,
+    statistics_table,
+    unit_of,
+)
+from ringsim.analysis.tails import tail_table
+from ringsim.analysis.verdicts import BOUND, SHARE_MET, verdict_table
+from ringsim.analysis.worst import command, margin_table, worst_tables
+from ringsim.files import write_text
+from ringsim.overrides import flat
+from ringsim.refusal import InputError, show
+from ringsim.report.page import drawn_inputs, provenance, values_of
+from ringsim.report.shell import written
+from ringsim.tables import Table, counted, number_text, with_unit
+from ringsim.variables import Status
+
+ECSS = "ECSS-E-ST-33-01C (6 March 2009), Mechanisms"
+NASA = "NASA-STD-7009, credibility of models and simulations"
+KNOWN = {
+    ECSS: "Clauses in ringsim's own words, after the text of 6 March 2009, which was read. Rev. 1 "
+    "(2017) and Rev. 2 (2019) were not: check numbers of clauses against the edition in force",
+    NASA: "The eight factors are known second-hand, from summaries by others: neither the edition "
+    "of 2008 nor 7009A (2016) or 7009B (2024) was read. ringsim gives no levels: people do",
+}
+"""The standards, and how their text is known."""
+HEAD = ("clause", "what it asks", "state", "result", "evidence")
+STATES = ANALYSED, PARTLY, MISSING = "analysed", "in part", "not analysed"
+_MEANS = (
+    f"{ANALYSED} says that the campaign has the numbers, not that the antenna complies: the review "
+    "judges that; what is missing stands in the result, in brackets what would supply it"
+)
+
+
+class Of(NamedTuple):
+    """What items are answered from."""
+
+    campaign: xr.Dataset
+    analysis: xr.Dataset
+    scene: Mapping[str, Any]
+    """Values of the scene by path."""
+    numbers: Table
+    """The statistics of all outputs."""
+    errors: Sequence[Table]
+    """The error budget, and errors of the solution."""
+    mark: str
+    """What stands behind outputs that lost runs bend."""
+
+
+@dataclass
+class Answer:
+    """What a campaign says about one clause."""
+
+    result: list[str] = field(default_factory=list)
+    evidence: list[str] = field(default_factory=list)
+    lacks: dict[str, str] = field(default_factory=dict)
+    """What is missing, and the key or command that would supply it."""
+
+    def __add__(self, other: "Answer") -> "Answer":
+        """Both, each line once."""
+        return Answer(
+            list(dict.fromkeys(self.result + other.result)),
+            list(dict.fromkeys(self.evidence + other.evidence)),
+            self.lacks | other.lacks,
+        )
+
+
+Ask = Callable[[Of], Answer]
+
+
+class Item(NamedTuple):
+    """A clause, and what answers it."""
+
+    standard: str
+    clause: str
+    asks: str
+    answer: Ask
+
+    @property
+    def place(self) -> tuple[list[int], str]:
+        """By what the items of a standard are ordered: the first number of the clause."""
+        first = re.findall(r"\d+(?:\.\d+)*", self.clause)[0]
+        return [int(part) for part in first.split(".")], self.clause
+
+
+ITEMS = list[Item]()
+"""All items, in any order."""
+
+
+def item(standard: str, clause: str, asks: str) -> Callable[[Ask], Ask]:
+    """Decorator: a function that answers a clause of a standard."""
+
+    def register(answer: Ask) -> Ask:
+        ITEMS.append(Item(standard, clause, asks, answer))
+        return answer
+
+    return register
+
+
+def dossier(campaign: xr.Dataset, analysis: xr.Dataset | None = None) -> list[Table]:
+    """A table a standard, a row a clause, columns ``HEAD``; cells may have several lines.
+
+    All numbers are those of ``analysis``, what ``analyse`` gives, by default of today.  InputError
+    if it is no campaign, or its requirements cannot be judged.
+    """
+    if not {"scene", "campaign"} <= campaign.attrs.keys():
+        raise InputError(
+            "this is not a campaign as ringsim merges it: give the folder that ringsim campaign "
+            "has written"
+        )
+    analysis = analyse(campaign) if analysis is None else analysis
+    scene = flat(tomllib.loads(str(campaign.attrs["scene"])))
+    told = statistics_table(analysis, every=True), error_tables(analysis, every=True)
+    of = Of(campaign, analysis, scene, *told, MARK * bool(analysis.attrs[NOTE]))
+    found = list[Table]()
+    for standard, known in KNOWN.items():
+        own = sorted((e for e in ITEMS if e.standard == standard), key=lambda each: each.place)
+        rows = [(each, each.answer(of)) for each in own]
+        table = Table(HEAD, [
+            (
+                each.clause, each.asks,
+                MISSING if not told.result else PARTLY if told.lacks else ANALYSED,
+                "\n".join([*told.result, *(f"Missing: {k} ({v})" for k, v in told.lacks.items())]),
+                "\n".join(told.evidence),
+            )
+            for each, told in rows
+        ], [known], left=len(HEAD), title=standard)  # fmt: skip
+        found.append(doubted(table, analysis.attrs, off_note(analysis.attrs)))
+    return found
+
+
+def lines(tables: Iterable[Table], head: Iterable[str], width: int = 100) -> list[str]:
+    """The same for terminals: a block a row, since cells are sentences."""
+    told = [line for each in head for line in textwrap.wrap(each, width)]
+    for table in tables:
+        told += ["", table.title, *(each for n in table.notes for each in textwrap.wrap(n, width))]
+        for clause, asks, state, *cells in table.rows:
+            told += ["", *textwrap.wrap(f"{clause}: {state}", width)]
+            for name, cell in zip(("asks", *HEAD[3:]), (asks, *cells), strict=True):
+                for k, line in enumerate(cell.splitlines()):
+                    first = f"  {'' if k else name:<10}"
+                    told += textwrap.wrap(
+                        line, width, initial_indent=first, subsequent_indent=" " * 14,
+                        break_long_words=False, break_on_hyphens=False,
+                    )  # fmt: skip
+    return told
+
+
+def write_dossier(campaign: xr.Dataset, out: Path, folder: str) -> tuple[int, list[str]]:
+    """Write the page of a merged campaign; its size in bytes, and its lines for a terminal.
+
+    ``folder`` is what readers give to ``ringsim replay``.  InputError if the file cannot be
+    written, or the requirements cannot be judged.
+    """
+    analysis = analyse(campaign)
+    tables = dossier(campaign, analysis)
+    says, counts = campaign.attrs, Counter(row[2] for each in tables for row in each.rows)
+    told = ", ".join(f"{counts[state]} {state}" for state in STATES if counts[state])
+    head = [
+        *head_lines(analysis),
+        f"computed by {says.get('source', 'unknown')}; commit {says.get('git_commit', 'unknown')}, "
+        f"sources {says.get('sources', 'unknown')}",
+        f"any sample k again: {command(folder, 0)[:-1]}k",
+        f"{counted(counts.total(), 'clause')}: {told}", _MEANS,
+    ]  # fmt: skip
+    context = {
+        "title": f"Verification dossier: {says.get('title') or 'campaign'}",
+        "head": head, "tables": tables, "provenance": list(provenance(campaign)),
+    }  # fmt: skip
+    text = written("dossier.html.j2", context, ())
+    write_text(out, text)
+    return len(text.encode("utf-8")), lines(tables, head)
+
+
+# What several items tell: outputs, requirements, inputs, each out of a table of the analysis.
+
+
+def _cells(tables: Iterable[Table], name: str) -> dict[str, str]:
+    """The cells of an output in tables, by the heads of their columns; empty without a row."""
+    rows = ((each.head, row) for each in tables for row in each.rows)
+    own = (dict(zip(*each, strict=True)) for each in rows if each[1][0] in (name, name + MARK))
+    return next(own, {})
+
+
+def outputs(**cures: str) -> Ask:
+    """An answer by outputs, and what supplies those that are missing, if that is said."""
+
+    def answer(of: Of) -> Answer:
+        found, evidence = Answer(), dict[str, list[str]]()
+        for name, cure in cures.items():
+            if name in of.analysis:
+                found.result.append(_output(of, name))
+                evidence.setdefault(_evidence(of, name), []).append(name)
+            elif cure:
+                key = re.match(r"([\w.]+) = true", cure)
+                there = key is not None and of.scene.get(key[1]) is True
+                found.lacks[name] = "no sample has a value" if there else cure
+        for told, names in evidence.items():
+            found.evidence.append(f"{', '.join(names)}: " * (len(evidence) > 1) + told)
+        return found
+
+    return answer
+
+
+def _output(of: Of, name: str) -> str:
+    """An output: mean with its interval, the quantile at its worse end, the worst sample."""
+    (factor, unit), told = unit_of(of.analysis, name), f"{name}{of.mark}"
+    cell, larger = _cells([of.numbers], name), quantities()[name].badness > 0
+    if not cell:
+        value = number_text(factor * float(of.analysis[name][-1]))
+        return f"{told}: {with_unit(value, unit)} in all samples that have it"
+    words = [f"from {cell['least']} to {with_unit(cell['most'], unit)}"]
+    if cell["mean"] != "-":
+        known, far = cell["95 % interval of it"], "95 %" if larger else "5 %"
+        words = [f"mean {with_unit(cell['mean'], unit)}" + f" (interval {known})" * (known != "-")]
+        words += [f"{far} quantile {with_unit(cell[far], unit)}"]
+    if (sample := cell["worst sample"]) != "-":
+        worst = with_unit(cell["most" if larger else "least"], unit)
+        words.append(f"worst {worst} in sample {sample}")
+    return f"{told}: {'; '.join(words)}"
+
+
+def _evidence(of: Of, name: str) -> str:
+    """Of how many samples an output is, and its largest numerical errors."""
+    used, lost, absent, _ = of.analysis[f"{name}_samples"].values
+    cell, unit = _cells(of.errors, name), unit_of(of.analysis, name)[1]
+    words = [f"{used} of {used + lost + absent} samples"]
+    for most, count, told in (
+        ("largest bar", "samples with bars", "error bar"),
+        ("largest difference", "samples checked", "engine difference"),
+    ):
+        if cell.get(most, "-") != "-":
+            number, _, where = cell[most].partition(" ")
+            of_all = "largest of " * (cell[count] != "1") + counted(int(cell[count]), told)
+            words.append(f"{of_all}: {with_unit(number, unit)} {where}".rstrip())
+    return "; ".join(words)
+
+
+def _verdicts(of: Of, *names: str) -> Answer:
+    """The verdicts on requirements, all without names."""
+    found, table = Answer(), verdict_table(of.analysis)
+    for row in table.rows:
+        cell = dict(zip(table.head, row, strict=True))
+        name = cell["requirement"].split()[0]
+        if names and name not in names:
+            continue
+        bound, lost, go = cell[BOUND], cell["failed runs"], cell["samples to go"]
+        found.result.append(
+            f"{cell['requirement']} in at least {cell['probability']} of all (confidence "
+            f"{cell['confidence']}): {cell['verdict']}" + f"; {SHARE_MET}: {bound}" * (bound != "-")
+        )
+        found.evidence.append(
+            f"{name}: {cell['violating']} of {cell['samples used']} samples violate it"
+            + f", {lost} failed" * (lost != "0")
+            + f"; {go} more without a violation would prove it" * (go != "-")
+        )
+    return found
+
+
+def _drawn(of: Of, chosen: Callable[[str, str], bool]) -> list[str]:
+    """Inputs that are chosen by path and unit, with their laws and what was drawn."""
+    return [
+        f"{name}: {law}; drawn: {extent} {unit}".rstrip(" -")
+        for name, unit, _, law, extent, paths in drawn_inputs(of.campaign)
+        if any(chosen(path, unit) for path in paths.split(", "))
+    ]
+
+
+def _ends(of: Of) -> list[str]:
+    """What became of the antennas, with shares."""
+    return [
+        f"{kind}: {samples}" + f", share {share} (interval {ends})" * (ends != "-")
+        for kind, samples, share, ends, *_ in outcome_table(of.analysis).rows
+    ]
+
+
+# ECSS-E-ST-33-01C.
+
+
+@item(ECSS, "4.2.5.1, 4.8.2.9 Reliability", "How often the function succeeds.")
+def _reliability(of: Of) -> Answer:
+    shown, found, rare = _verdicts(of, OUTCOME), Answer(_ends(of)), tail_table(of.analysis)
+    found.result += [f"{rare.head[1]}: {what}: {told}" for what, told in rare.rows]
+    if not shown.result:
+        law = 'outcome = { is = "deployed", probability = P, confidence = C }'
+        found.lacks["how often it must succeed"] = f"[requirements] {law}"
+    return found + shown
+
+
+@item(ECSS, "4.7.4.2, 4.8.2.3 Thermal design", "It works at all temperatures and gradients.")
+def _temperature(of: Of) -> Answer:
+    found = Answer(_drawn(of, lambda path, unit: unit == "K" or path.startswith("temperature.")))
+    for path, values in of.scene.items():
+        if path.startswith("temperature.") and path.endswith(".temperatures"):
+            known = f"{path.removesuffix('.temperatures')} for {values[0]:g} to {values[-1]:g} K"
+            found.evidence.append(f"the scene has {known}")
+    if not found.result:
+        cure = "draw temperature.joint.value or temperature.pulley.value under [inputs]"
+        found.lacks["scatter of temperatures"] = cure
+    return found
+
+
+_ALLOWABLES = {"peak_tension": "limits.tension", "peak_rod_stress": "limits.rod_stress"}
+
+
+@item(ECSS, "4.7.5.2.5, 4.8.2.4 Margin of safety", "Allowable / (worst load x factor) - 1 > 0.")
+def _strength(of: Of) -> Answer:
+    found, margins = Answer(), margin_table(of.analysis).rows
+    for name, limit in _ALLOWABLES.items():
+        own = [row for row in margins if row[0].startswith(limit)]
+        found += outputs(**{name: ""})(of) + _verdicts(of, name)
+        for told, of_what, worst, margin, sample in own:
+            found.result.append(f"{told}: margin {margin}, of {of_what} {worst} in sample {sample}")
+            found.lacks["factor of safety F"] = "the project's; then (1 + margin) / F - 1"
+        if not own:
+            more = "record.stress = true and " * (name not in of.analysis and "stress" in name)
+            found.lacks[f"allowable of {name}"] = f"{more}{limit}"
+    return found + Answer()
+
+
+@item(
+    ECSS, "4.7.5.3, 4.8.2.8 Functional dimensioning (motorization)",
+    "At every position the drive is at least twice the sum of all resistances, each times its "
+    "factor; momentum does not count.",
+)  # fmt: skip
+def _drive(of: Of) -> Answer:
+    name, kind, wanted = "least_drive_margin", of.scene.get("margin.kind"), "ecss-e-st-33-01c"
+    cure = f'margin.kind = "{wanted}", and winches with motors, whose pull has a bound'
+    found, values = outputs(least_drive_margin=cure)(of), numbers(of.campaign, name)
+    held = good(of.campaign) & np.isfinite(values)
+    if not held.any():
+        return found
+    k, short = int(np.argmin(np.where(held, values, np.inf))), int((values[held] < 0.0).sum())
+    angle, time = (numbers(of.campaign, f"{name}_{word}")[k] for word in ("angle", "time"))
+    sample = int(of.campaign["sample"][k])
+    found.result += [
+        f"in sample {sample} it is least at {angle:.3g} deg, {time:.3g} s",
+        f"below 0 in {short} of {int(held.sum())} samples" + ": NOT enough" * bool(short),
+        *filter(None, [of.analysis.attrs.get(LATE)]),
+    ]
+    factors = ", ".join(
+        f"{path.removeprefix('margin.').replace('_', ' ')} {show(value)}"
+        for path, value in of.scene.items() if path.startswith("margin.")
+    )  # fmt: skip
+    found.evidence.append(f"static margin at all angles passed; {factors}")
+    if kind != wanted:
+        found.lacks["the factors of this clause"] = f'margin.kind = "{wanted}"'
+    return found + _verdicts(of, name)
+
+
+@item(ECSS, "4.7.5.4.3 Latching or locking", "Latches catch at all temperatures and tolerances.")
+def _latching(of: Of) -> Answer:
+    found = outputs(latched_joints="stop.latch = true", least_latch_rate="")(of)
+    if found.result:
+        found.result = [line for line in _ends(of) if line.startswith(REACHED)] + found.result
+        if rate := of.scene.get("latch.min_rate"):
+            found.evidence.append(f"a latch catches from {rate:g} rad/s on")
+        others = _temperature(of).lacks | _tolerances(of).lacks
+        found.lacks |= {what: others[what] for what in others if what.startswith("scatter")}
+    return found + _verdicts(of, "latched_joints", "least_latch_rate")
+
+
+@item(ECSS, "4.8.2.1 Cases", "Extremes together, and what the ground changes: weight, test rig.")
+def _cases(of: Of) -> Answer:
+    kind, found = of.analysis.attrs["design"], Answer()
+    if kind in ("grid", "list", "one-at-a-time"):
+        found.result.append(f"cases are chosen: design {kind}")
+    else:
+        cure = f'design {kind} meets them by chance; kind = "grid" or "list" places them'
+        found.lacks[_EXTREMES] = cure
+    ground = [f"{path} = {show(value)}" for path, value in of.scene.items()
+              if path.startswith(("gravity.", "offload."))]  # fmt: skip
+    found.result.append(", ".join(ground) or "in orbit: no gravity, no lines of a test rig")
+    if not ground:
+        cure = "the same seed with gravity and offload, then ringsim compare"
+        found.lacks["the ground"] = cure
+    return found
+
+
+@item(ECSS, "4.8.2.2 Worst-case identification", "Which cases size the mechanism.")
+def _worst(of: Of) -> Answer:
+    rows = ((each.title, *each.rows[0]) for each in worst_tables(of.analysis, ""))
+    told = [f"{what}: worst sample {k}, {value}; inputs: {odd}" for what, k, value, odd, _ in rows]
+    none = "no sample fails or violates a requirement; worst samples of outputs stand above"
+    return Answer(told or [none] * bool(of.analysis.attrs["samples_run"]))
+
+
+_EXTREMES = "extremes together"
+_LENGTHS = "structure.", "rods.length_error", "rods.diagonal", "rods.bar", "boom.length"
+
+
+@item(ECSS, "4.8.2.5 Tolerance budget", "Manufacturing tolerances together with worst loads.")
+def _tolerances(of: Of) -> Answer:
+    own = _drawn(of, lambda path, unit: path.startswith(_LENGTHS) and unit in ("m", ""))
+    if own:
+        return Answer(own) + outputs(best_fit_rms="record.shape = true")(of)
+    cure = "draw rods.length_error or structure.hinge_error under [inputs]"
+    return Answer(lacks={"scatter of lengths": cure})
+
+
+@item(ECSS, "4.8.2.6.3 a Conformance", "Each requirement is kept, with parameters at their worst.")
+def _requirements(of: Of) -> Answer:
+    found = _verdicts(of)
+    if not found.result:
+        return Answer(lacks={"requirements": "[requirements]"})
+    return found + Answer(lacks={k: v for k, v in _cases(of).lacks.items() if k == _EXTREMES})
+
+
+@item(ECSS, "4.8.2.6.3 b Failure cases", "Failures of parts, and what to do then.")
+def _faults(of: Of) -> Answer:
+    found = Answer(_drawn(of, lambda path, _: path.startswith("faults") or "stop_time" in path))
+    if "case" in of.analysis.dims:
+        ends = Counter(of.analysis["case_outcome"].values.tolist())
+        told = ", ".join(f"{count} {end}" for end, count in ends.items())
+        found.result.append(f"{counted(sum(ends.values()), 'case')} of one change each: {told}")
+    if not found.result:
+        found.lacks["failures"] = 'draw faults under [inputs], or design.kind = "one-at-a-time"'
+    return found
+
+
+@item(ECSS, "4.8.2.6.3 c Integrity check", "A check within the results, as an energy balance.")
+def _integrity(of: Of) -> Answer:
+    rows = [row for each in of.errors for row in each.rows if "median" in each.head]
+    found = Answer([f"{name}: median {median}, largest {most}" for name, median, most, _ in rows])
+    found.evidence += sorted({f"{row[-1]} samples" for row in rows})
+    return found if rows else Answer(lacks={"energy balance": "no sample has a valid result"})
+
+
+_SHOWN = 5
+"""Outputs that are told what matters for, where no requirement chooses them."""
+
+
+@item(ECSS, "4.8.2.6.3 d Sensitivity analysis", "Which uncertain parameters matter.")
+@item(NASA, "factor 5, results robustness (second-hand)", "How results change with the inputs.")
+def _sensitivity(of: Of) -> Answer:
+    table = what_matters(of.analysis)
+    wanted = [line.partition(":")[0] for line in _verdicts(of).evidence]
+    rows = [row for row in table.rows if row[0]]
+    plain = [row for row in rows if row[0] in quantities() and quantities()[row[0]].summary]
+    own = [row for row in rows if row[0] in wanted] or (plain or rows)[:_SHOWN]
+    cells = [(row, zip(table.head[2:], row[2:], strict=True)) for row in own]
+    found = Answer([
+        f"{row[0]} most by {row[1]}: "
+        + ", ".join(f"{head} {cell}" for head, cell in each if cell not in ("", "-"))
+        for row, each in cells
+    ])  # fmt: skip
+    found.evidence += ["ringsim analyse --full lists all outputs and inputs"] * bool(rows)
+    found.evidence += [note for note in table.notes if note.startswith("no significant")]
+    if not rows:
+        found.lacks["effects beyond chance"] = "more samples, or inputs that scatter"
+    return found
+
+
+@item(ECSS, "4.8.2.6.3 e, f Test", "Differences of test and prediction are explained.")
+@item(NASA, "factor 2, validation (second-hand)", "How well results agree with the real thing.")
+def _validation(of: Of) -> Answer:
+    cure = "ringsim compare DIR TEST.toml and ringsim report --measured lay them beside the samples"
+    return Answer(learnt_lines(of.campaign), lacks={"readings of a test": cure})
+
+
+# NASA-STD-7009.
+
+
+@item(NASA, "factor 1, verification (second-hand)", "How large numerical errors are.")
+def _verification(of: Of) -> Answer:
+    found, own = _integrity(of), [name for name, each in quantities().items() if each.summary]
+    told = {name: _evidence(of, name).partition("; ")[2] for name in own if name in of.analysis}
+    found.result += [f"{name}: {errors}" for name, errors in told.items() if errors]
+    if not any("bar" in errors for errors in told.values()):
+        found.lacks["numerical error bars"] = "error_bars_every"
+    if f"status{CHECKED}" not in of.campaign:
+        fast = of.campaign.attrs.get("fidelity") == "frame"
+        cure = "check_every" if fast else 'fidelity = "frame" with check_every'
+        found.lacks["the other engine"] = cure
+        return found
+    checked = (of.campaign[f"status{CHECKED}"] == Status.OK).to_numpy() & good(of.campaign)
+    found.evidence.append(f"{counted(int(checked.sum()), 'sample')} answered by both engines")
+    found.result += verdict(of.campaign, differences(of.campaign))
+    return found
+
+
+_ORIGINS = {
+    "drawn": "drawn", "drawn in part": "drawn in part", "campaign": "set by the campaign",
+    "inferred": "marked inferred in the scene", "scene": "of the scene's file",
+    "default": "defaults of ringsim",
+}  # fmt: skip
+
+
+@item(NASA, "factor 3, input pedigree (second-hand)", "Where inputs come from, and how sure.")
+def _pedigree(of: Of) -> Answer:
+    counts = Counter(each.origin for each in values_of(of.campaign)[0])
+    told = ", ".join(f"{counts[k]} {word}" for k, word in _ORIGINS.items() if counts[k])
+    found = Answer([f"{counts.total()} values: {told}", *_drawn(of, lambda *_: True)])
+    found.evidence.append("ringsim report lists every value and its origin")
+    if learnt := learnt_lines(of.campaign):
+        found.result += learnt
+    else:
+        found.lacks["inputs that a test has told"] = 'ringsim calibrate, then from = "posterior.nc"'
+    if not counts["inferred"] + counts["default"]:
+        found.lacks["which values are assumed"] = "no scene file of one's own tells: list them"
+    return found
+
+
+@item(NASA, "factor 4, results uncertainty (second-hand)", "How uncertain the results are.")
+def _uncertainty(of: Of) -> Answer:
+    found, says = Answer(), of.analysis.attrs
+    ends = [of.analysis[f"{n}_interval"].values for n in quantities() if n in of.analysis]
+    if np.isfinite(ends).any():
+        found.result += [says["intervals"], *filter(None, [says[NOTE], says["stopping"]])]
+    else:
+        found.lacks["intervals"] = says["intervals"] or "more samples"
+    found.evidence.append(f"{says['samples_run']} of {says['samples']} samples have run")
+    largest = dict[str, list[str]]()
+    for name in quantities():
+        if source := _cells(of.errors, name).get("dominates", "-").partition(" ")[0].strip("-"):
+            largest.setdefault(source, []).append(name)
+    for source, names in largest.items():
+        told = counted(len(names), "output") if source == SOURCES[0] else ", ".join(names)
+        found.evidence.append(f"largest part of the error of the mean is {source}: {told}")
+    return found
+
+
+@item(NASA, "factor 7, management (second-hand)", "Which model ran, and whether it can run again.")
+def _management(of: Of) -> Answer:
+    says = dict(provenance(of.campaign))
+    names = "ringsim version", "git commit", "sources", "identity", "seed"
+    found = Answer([f"{name} {says[name]}" for name in names if name in says])
+    others = [f"{k} {v}" for k, v in says.items() if k.endswith("version") and k not in names]
+    found.evidence += filter(None, [", ".join(others)])
+    if not re.fullmatch("[0-9a-f]+", says.get("git commit", "")):
+        found.lacks["a commit that holds all that ran"] = "commit changes before a campaign"
+    return found
+
+
+# Clauses that outputs alone answer, and those of which no campaign holds anything.
+
+
+_REACTIONS = "record.reactions = true"
+for _clause, _asks, _cures in (
+    ("4.4.2 Mechanism function", "The motion over time, and its tolerances.",
+     {"deployment_time": "no sample has deployed", "asynchrony_max": "no angle was recorded"}),
+    ("4.7.5.2.2, 4.8.2.12 Loads", "Loads and motion of the spacecraft from the dynamics.",
+     {"peak_base_force": _REACTIONS, "peak_base_torque": _REACTIONS,
+      "base_rotation_max": f'[spacecraft], boom.base = "free", {_REACTIONS}'}),
+    ("4.7.5.4.3 i, 4.7.5.4.4 End stops, 4.8.2.11 Shock", "Shocks of latches and stops.",
+     {"peak_latch_rate": "stop.latch = true", "peak_lock_impulse": f"{_REACTIONS}, with stops",
+      "peak_acceleration_max": "record.accelerations = true"}),
+):  # fmt: skip
+    item(ECSS, _clause, _asks)(outputs(**_cures))
+
+
+@item(NASA, "factor 6, use history (second-hand)", "Whether the model served like cases before.")
+@item(NASA, "factor 8, people (second-hand)", "Whether those who ran and judge it are qualified.")
+@item(
+    ECSS, "4.8.2.7, 4.8.2.10, 4.8.2.13 to 4.8.2.19 Other analyses",
+    "Contact stress, gears, control, lubrication, life, humidity, magnets, radiation, electrics.",
+)  # fmt: skip
+def _not_here(_: Of) -> Answer:
+    return Answer(lacks={"all of it": "no campaign holds it: by other means, or say why not"})
