@@ -586,10 +586,8 @@ def rarer_table(analysis: xr.Dataset) -> Table:
         )
     notes += [f"further significant changes: {', '.join(more)}"] * bool(more)
     if quiet and which:
-        notes.append(
-            "if one input scattered otherwise (by weights of these samples), no significant change "
-            f"of the probability of violating {', '.join(quiet)}"
-        )
+        what = "if one input scattered otherwise, no significant change of the probability of"
+        notes.append(f"{what} violating {', '.join(quiet)} (by weights of these samples)")
     why = "changes that these samples cannot tell, since few would have most of the weight"
     notes += [f"{why}: {', '.join(unequal)}"] * bool(unequal)
     needs = f"{LEAST_OF_SHARE:g} that violate and as many that do not are needed"

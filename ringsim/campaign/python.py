@@ -312,12 +312,12 @@ def _run_on(executor: Executor, parts: int, order: Order) -> int:
             except Exception as error:  # whatever an executor raises for a worker that has died
                 lost.append((k + 1, error))
         if lost:
-            number, error = lost[0]
-            why = f"{type(error).__name__}: {error}"
+            number, cause = lost[0]
+            why = f"{type(cause).__name__}: {cause}"
             raise CampaignError(
                 f"{order.folder}: part {number}/{parts} was lost ({why}): call again to run what "
                 "is left"
-            ) from error
+            ) from cause
         code = max(codes)  # a signal's 130, then failure's 3
         if code != EXIT_DONE or not more:
             return code

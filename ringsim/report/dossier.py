@@ -335,8 +335,9 @@ def _strength(of: Of) -> Answer:
     for name, limit in _ALLOWABLES.items():
         own = [row for row in margins if row[0].startswith(limit)]
         found += outputs(**{name: ""})(of) + _verdicts(of, name)
-        for told, of_what, worst, margin, sample in own:
-            found.result.append(f"{told}: margin {margin}, of {of_what} {worst} in sample {sample}")
+        for told, of_what, worst, margin, sample, beyond in own:
+            worst += f" in sample {sample}; beyond it {beyond}"
+            found.result.append(f"{told}: margin {margin}, of {of_what} {worst}")
             found.lacks["factor of safety F"] = "the project's; then (1 + margin) / F - 1"
         if not own:
             more = "record.stress = true and " * (name not in of.analysis and "stress" in name)

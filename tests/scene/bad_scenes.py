@@ -38,7 +38,10 @@ UNKNOWN_KEYS = [
     _scene("key of a campaign", 'fidelity = "frame"', "fidelity", "for a run use --fidelity"),
     _scene("Celsius", "temperature.bar.value = -40.0", "at least 1 K; -40 C are 233.15 K"),
     _scene("millimetres", "structure.half_bar = 1028.7", "at most 1000 m; 1028.7 mm are 1.0287 m"),
-    _scene("gigapascal", 'rods = { kind = "geometrically-exact", young_modulus = 120.0 }', "at least 100000 Pa; 120 GPa are 1.2e+11 Pa"),
+    _scene(
+        "gigapascal", 'rods = { kind = "geometrically-exact", young_modulus = 120.0 }',
+        "at least 100000 Pa; 120 GPa are 1.2e+11 Pa",
+    ),
     _scene("capital letters", "loads.force = 1.0\nloads.Force = 1.0", "loads.Force", "mean force?"),
     _scene("solver", "solver.time_step = 0.1", "solver.time_step", "did you mean step?"),
     _scene("record", "record.stresses = true", "record.stresses", "did you mean stress?"),
