@@ -72,6 +72,20 @@ def test_lock_order_counts_ties_by_halves_and_what_stays_open() -> None:
     assert "all V-joints come to 180 deg in 2 samples" in words(lock_order(campaign))
 
 
+def test_bars_of_few_samples_have_their_share_in_words() -> None:
+    """One of a hundred is a line on the axis, which goes to all of them."""
+    campaign = made_campaign(100)
+    campaign["lock_time"][:] = 5.0
+    campaign["lock_time"][:, 0, 1] = 4.0
+    campaign["lock_time"][0, 0, 0] = 3.0
+    upper, lower = lock_order(campaign).axes
+    assert upper.get_ylim()[1] > 1.0
+    assert "100%" in [upper.yaxis.get_major_formatter()(tick) for tick in upper.get_yticks()]
+    texts = [(t.get_position()[0], t.get_text()) for t in upper.texts if "1%" == t.get_text()]
+    assert texts == [(campaign["section"].values[0], "1%")]
+    assert not [t for t in lower.texts if t.get_text() == "1%"]
+
+
 def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
     figure = distributions(mixed)
     values = np.sort(mixed["asynchrony_max"].values[GOOD])
