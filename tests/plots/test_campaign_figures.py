@@ -168,6 +168,7 @@ def test_tension_by_span(mixed: xr.Dataset) -> None:
 
 def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     figure = by_input(mixed)
+    assert figure.get_suptitle().startswith("Asynchrony and outcome by input: ")
     points = {c.get_label(): c.get_offsets() for c in figure.axes[1].collections}
     assert {name: len(at) for name, at in points.items()} == {
         "deployed (5)": 5, "failed: timeout (2)": 2,

@@ -346,7 +346,10 @@ def by_input(campaign: xr.Dataset) -> Figure:
     if others > 0:
         note += f" Not drawn: {others} inputs whose rank correlation with the number is smaller."
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
-    head(figure, campaign, "Outcome by input", f"{count}{below}.{note}")
+    # asynchrony_max, deployment_time
+    judged = f"{name.removesuffix('_max').replace('_', ' ')} and outcome by input"
+    subject = f"{judged[0].upper()}{judged[1:]}" if name else "Outcome by input"
+    head(figure, campaign, subject, f"{count}{below}.{note}")
     return figure
 
 
