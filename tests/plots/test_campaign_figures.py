@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from made_campaign import made_campaign, with_motors
+from made_campaign import made_campaign, made_scene, with_motors
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -100,6 +100,37 @@ def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
     np.testing.assert_allclose(dots.get_xdata(), told)
     one = distributions(made_campaign(1)).axes[0]
     assert not [line for line in one.lines if line.get_marker() == "o"]
+
+
+def test_loads_with_an_allowable_come_first_and_show_it() -> None:
+    campaign = with_motors(made_campaign(8))
+    every = [n for n, each in VARIABLES.items() if each.summary is not None and each.dtype == "f8"]
+    for name in every:
+        campaign[name] = "sample", 100.0 + np.arange(8.0), {"units": VARIABLES[name].units}
+    campaign["peak_tension"].values[:] = 20.0 + 1e-3 * np.arange(8.0)
+    campaign.attrs["requirements"] = "{}"
+    scene = made_scene()
+    assert "peak_tension" not in shown(campaign)[0]
+    for limit in (30.0, 500.0):
+        own = campaign.assign_attrs(scene=scene.with_values({"limits.tension": limit}).to_toml())
+        figure = distributions(own)
+        assert shown(own)[0][0] == "peak_tension"
+        panel = figure.axes[0]
+        at = [line.get_xdata()[0] for line in panel.lines if len(line.get_xdata()) == 2]
+        told = " ".join(text.get_text() for text in panel.texts)
+        # One far beyond all values would leave them at the edge.
+        near = limit < 100.0
+        assert (at == [limit], "limit 30 N" in told) == (near, near)
+        assert ("limit 500 N" in panel.get_title(loc="left")) is not near
+
+
+def test_labels_of_expressions_fit_their_panels() -> None:
+    text = "apart = max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
+    made = xr.DataArray(0.0, name="apart", attrs={"long_name": text, "units": "deg"})
+    told = style.label(made, width=38)
+    assert max(map(len, told.split("\n"))) <= 34
+    assert "".join(told.split()) == f"{text} (deg)".replace(" ", "")
+    assert "(\ndeg" not in told
 
 
 def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
