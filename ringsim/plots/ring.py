@@ -336,7 +336,7 @@ def modes(found: xr.Dataset) -> Figure:
         panel.set_axis_off()
         for places, there in ((rest, False), (moved, True)):
             parts = {n: ends for n, ends in points.drawn(places).items() if n != "V-joints"}
-            # Shapes have ways and no turns: of a turning base the centre is drawn as far as its top.
+            # Shapes have ways and no turns: the centre goes as far as the boom's upper end.
             parts |= _spacecraft(scene, points, places, np.zeros(3))
             names = [name for name, ends in parts.items() for _ in ends]
             lines, depths = view(np.concatenate(list(parts.values())), azimuth, _ELEVATION)

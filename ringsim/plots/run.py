@@ -19,8 +19,8 @@ from ringsim.tables import known_to, unit_text, with_unit
 
 # The largest value of a run as a point of what is drawn: records stand at fixed times, so that
 # campaigns have one time axis, and a peak seldom falls on one.  Its value, time and place are
-# numbers of the dataset.  Figures put them into the curve of what is drawn alone; of curves that are
-# compared only one would get its peak, and look larger than the others: there it is a mark.
+# numbers of the dataset.  Figures put them into the curve of what is drawn alone; of curves that
+# are compared only one would get its peak, and look larger than the others: there it is a mark.
 
 
 class Peak(NamedTuple):
@@ -109,11 +109,11 @@ def mark(
     early = peak.time < 0.5 * sum(axes.get_xlim())
     apart = "" if curve is None else peak.apart(curve)
     largest = "largest of all steps" if apart else "largest"
+    when = f"{largest}: {told} {units} at {peak.time:.4g} s"
     style.free(axes.text(
         0.98 if early else 0.02, 0.95 if early else 0.82,
-        "\n".join(filter(None, [f"{largest}: {told} {units} at {peak.time:.4g} s", place, apart])),
-        transform=axes.transAxes, va="top", ha="right" if early else "left", color=style.VERMILION, bbox=style.PAPER,
-        zorder=5,
+        "\n".join(filter(None, [when, place, apart])), transform=axes.transAxes, va="top",
+        ha="right" if early else "left", color=style.VERMILION, bbox=style.PAPER, zorder=5,
     ))  # fmt: skip
 
 

@@ -81,7 +81,7 @@ def test_bars_of_few_samples_have_their_share_in_words() -> None:
     upper, lower = lock_order(campaign).axes
     assert upper.get_ylim()[1] > 1.0
     assert "100%" in [upper.yaxis.get_major_formatter()(tick) for tick in upper.get_yticks()]
-    texts = [(t.get_position()[0], t.get_text()) for t in upper.texts if "1%" == t.get_text()]
+    texts = [(t.get_position()[0], t.get_text()) for t in upper.texts if t.get_text() == "1%"]
     assert texts == [(campaign["section"].values[0], "1%")]
     assert not [t for t in lower.texts if t.get_text() == "1%"]
 

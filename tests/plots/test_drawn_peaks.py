@@ -59,7 +59,7 @@ def test_the_highest_point_is_the_number_of_the_summary(draw, label, number, fac
 
 
 def test_a_peak_between_records_is_in_no_curve_of_those_compared(truss):
-    """Only one plane has it: in its curve, with coarse records, the other would look far smaller."""
+    """Of one plane alone: in its curve the other, recorded seldom, would look far smaller."""
     rows = cables(truss).axes[6:]
     curves = [line for axes in rows for line in axes.lines if len(line.get_xdata()) > 2]
     assert len(curves) >= 2
