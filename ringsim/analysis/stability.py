@@ -275,7 +275,8 @@ def to_markdown(whole: xr.Dataset) -> str:
     parts = ["# Stability map", summary(whole), *(_checks(whole) if "check" in whole else ())]
     parts += ["![How each cell ended](stability.png)", *engines_text(whole)]
     parts += ["## Borders", markdown_table(head, borders(whole))]
-    parts += ["## Where ok ends", _causes(whole)]
+    if (whole["verdict"] != OK).any():
+        parts += ["## Where ok ends", _causes(whole)]
     if suspects := np.flatnonzero(whole["verdict"] == WRONG).tolist():
         parts += ["## Wrong cells", "\n".join(_cell(whole, k) for k in suspects)]
     return "\n\n".join(parts) + "\n"

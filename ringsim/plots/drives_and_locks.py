@@ -123,7 +123,8 @@ _DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1, 1.5)))
 )
 def motors(dataset: xr.Dataset) -> Figure:
     """A panel for each of ``motor_torque``, ``motor_speed``, ``motor_power`` and, where it is
-    known, ``motor_current`` (plane, winch, time); a line a motor, a dot at its largest value.
+    known, ``motor_current`` (plane, winch, time); a line a motor as recorded, a dot at the largest
+    value of all steps, which may lie between two records.
     """
     names = [name for name in _MOTOR if name in dataset and np.isfinite(dataset[name]).any()]
     figure = Figure(figsize=(8.4, 1.9 * len(names) + 1.3))
@@ -138,14 +139,14 @@ def motors(dataset: xr.Dataset) -> Figure:
             values = dataset[name].isel(plane=plane, winch=winch)
             called = f"{values['plane'].item()} cable"
             called += f", winch {values['winch'].item()}" if dataset.sizes["winch"] > 1 else ""
-            own = (values["time"], values) if peak is None else peak.within(values)
-            axes.plot(*own, label=called,
+            axes.plot(values["time"], values, label=called,
                       color=_LINES[number % len(_LINES)],
                       linestyle=_DASHES[number % len(_DASHES)])  # fmt: skip
         axes.set_ylabel(style.label(dataset[name], width=24), fontsize=9)
         axes.margins(y=0.12)
         if peak is not None:
-            mark(axes, peak, str(dataset[name].attrs["units"]), f"{peak.place['plane']} cable")
+            mark(axes, peak, str(dataset[name].attrs["units"]), f"{peak.place['plane']} cable",
+                 curve=dataset[name].sel(peak.place))  # fmt: skip
     figure.align_ylabels(panels)
     style.time_axes(dataset, dataset["motor_torque"].max(("plane", "winch")), *panels)
     handles, words = panels[0].get_legend_handles_labels()

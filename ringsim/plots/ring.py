@@ -16,7 +16,7 @@ from scipy.constants import kilogram_force
 from scipy.spatial.transform import Rotation
 
 from ringsim.layout.layout import layout_of
-from ringsim.layout.points import points_of
+from ringsim.layout.points import Points, points_of
 from ringsim.plots import jointed, picture, style
 from ringsim.plots.run import Peak, peak_of
 from ringsim.scene import Scene, scene_from_toml
@@ -216,7 +216,8 @@ def _shot(
         shape.at(float(angles["time"])) if shape.computed
         else places_at(shape.scene, shape.points, openings)
     )  # fmt: skip
-    parts = shape.lines(places) | _spacecraft(shape, places, turn)
+    turned = turn * shape.computed
+    parts = shape.lines(places) | _spacecraft(shape.scene, shape.points, places, turned)
     joints = parts.pop("V-joints") + _POINT
     for name, own in (("V-joints, locked", locked.ravel()), ("V-joints, free", ~locked.ravel())):
         parts |= {name: joints[own]} if own.any() else {}
@@ -229,17 +230,16 @@ def _shot(
     return [names[k] for k in order], lines[order], near[order]
 
 
-def _spacecraft(shape: Shape, places: Array, turn: Array) -> dict[str, Array]:
+def _spacecraft(scene: Scene, points: Points, places: Array, turn: Array) -> dict[str, Array]:
     """Where the spacecraft's centre of mass is, as a point, and the line that leads to it from the
-    boom's upper end, which it is fixed to.
-
-    Only what is drawn as computed has turned with its base by the rotation vector ``turn``, rad.
+    boom's upper end, which it is fixed to, and has turned with by the rotation vector ``turn``,
+    rad.
     """
-    craft, base = shape.scene.spacecraft, layout_of(shape.scene).base
+    craft, base = scene.spacecraft, layout_of(scene).base
     if craft is None or base is None:
         return {}
-    top, turned = places[shape.points.of_body(base)], turn * shape.computed
-    centre = top + Rotation.from_rotvec(turned).apply(np.array(craft.centre))
+    top = places[points.of_body(base)]
+    centre = top + Rotation.from_rotvec(turn).apply(np.array(craft.centre))
     found = {"spacecraft": (centre + _POINT)[None]}
     if any(craft.centre):
         found["from the boom's upper end to it"] = np.array([[top, centre]])
@@ -335,11 +335,14 @@ def modes(found: xr.Dataset) -> Figure:
         panel.set_axis_off()
         for places, there in ((rest, False), (moved, True)):
             parts = {n: ends for n, ends in points.drawn(places).items() if n != "V-joints"}
+            # Shapes have ways and no turns: the centre goes as far as the boom's upper end.
+            parts |= _spacecraft(scene, points, places, np.zeros(3))
             names = [name for name, ends in parts.items() for _ in ends]
             lines, depths = view(np.concatenate(list(parts.values())), azimuth, _ELEVATION)
             order = np.argsort(near := depths.mean(axis=-1), kind="stable")
             if there:
                 _draw(panel, [names[n] for n in order], lines[order], near[order], 0.8)
+                panel.update_datalim(lines.reshape(-1, 2))  # room below the words above
             else:
                 panel.add_collection(LineCollection(list(lines), colors=style.PALE, linewidths=0.8))
         panel.set_aspect("equal")
@@ -349,8 +352,11 @@ def modes(found: xr.Dataset) -> Figure:
         part = str(found["part"].values[int(np.abs(own["energy_share"].values).argmax())])
         panel.set_title(f"mode {k + 1}: {told}\n{part}", fontsize=9)
     joints = "latched" if last["latched"] else "free"
-    figure.text(0.01, 0.005, f"shapes at {last['angle'].item():.4g} deg, V-joints {joints}, "
-                "enlarged", fontsize=8, color=style.GREY)  # fmt: skip
+    craft = "; dot: the spacecraft's centre of mass" if scene.spacecraft is not None else ""
+    figure.text(0.01, 0.005, f"shapes at {last['angle'].item():.4g} deg, V-joints {joints}; the "
+                f"largest displacement is drawn as {_BENT * size:.3g} m, {100 * _BENT:g} % of the "
+                f"structure's size{craft}",
+                fontsize=8, color=style.GREY)  # fmt: skip
     style.title(figure, str(found.attrs["title"]))
     return figure
 

@@ -76,11 +76,11 @@ def rod_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Fi
         style.name_panel(axes, name)
         style.draw_limit(axes, factor * limit, f"limits.rod_stress = {factor * limit:g} {units}")
         if peak.place["rod"].startswith(f"{rod}_"):
-            worst = peak.within(stress.sel(peak.place), factor)
-            axes.plot(*worst, zorder=3, **_LARGEST)
+            worst = stress.sel(peak.place)
+            axes.plot(worst["time"], factor * worst, zorder=3, **_LARGEST)
             half = peak.place["rod"].rpartition("_")[-1]
             place = f"section {peak.place['section']}, {name}, {half} half"
-            mark(axes, peak, units, place, factor)
+            mark(axes, peak, units, place, factor, worst)
     figure.supylabel(style.label(stress, units), fontsize=10.5)
     entries = [
         Line2D([], [], color=colour, linestyle=dashes, label=f"section {n}")
@@ -289,12 +289,16 @@ def _draw_sections(axes: Axes, time: xr.DataArray, rows: Array) -> None:
         axes.plot(time, row, color=colours(section), linewidth=1.2, label=named)
 
 
+_SLACK = "no line where the rope before it is slack."
+
+
 @picture("run", 60, "Spans and tensions of the cables", ("cable_tension", "rope_strain"), barred)
 def cables(dataset: xr.Dataset) -> Figure:
     """Neutral lengths, elongations, decays and tensions, section by section.
 
     One column for each plane with a cable; colour counts the sections from the winch.  Bands hold
-    the tensions of all spans, and the span with ``peak_tension`` is drawn beside the sections'.
+    the tensions of all spans, and the span with ``peak_tension`` is drawn beside the sections', in
+    each column; curves are as recorded, and a dot is ``peak_tension``.
     """
     tension = dataset["cable_tension"]
     planes = tension.dropna("plane", how="all")["plane"].values.tolist()
@@ -321,14 +325,15 @@ def cables(dataset: xr.Dataset) -> Figure:
         style.draw_limit(axes, limit, f"limits.tension = {limit:g} N")
         least, most = spans.min("span"), spans.max("span")
         axes.fill_between(dataset["time"], least, most, color=style.PALE, linewidth=0.0)
+        worst = spans.sel(span=peak.place["span"])
+        axes.plot(worst["time"], worst, color=style.VERMILION, linewidth=1.0, zorder=3)
         if plane == peak.place["plane"]:
-            worst = peak.within(spans.sel(span=peak.place["span"]))
-            axes.plot(*worst, color=style.VERMILION, linewidth=1.0, zorder=3)
             later = " until all have locked" if float(tension.max()) > peak.value else ""
-            name = spans.sel(span=peak.place["span"]).coords.get("span_name")
+            name = worst.coords.get("span_name")
             place = f"span {peak.place['span']}" + (f", {name.item()}" if name is not None else "")
-            mark(axes, peak, str(tension.attrs["units"]), place + later)
-    style.name_sections(figure, grid[0, 0])
+            mark(axes, peak, str(tension.attrs["units"]), place + later, curve=worst)
+    gaps = any(np.isnan(each["decay"]).any() for each in series.values())
+    style.name_sections(figure, grid[0, 0], f"Third row: {_SLACK}" * bool(gaps))
     style.head(figure, grid[0, 0], dataset, "Cables")
     return figure
 
@@ -367,7 +372,10 @@ def pulleys(dataset: xr.Dataset) -> Figure:
     air = 0.1 * (high - low)
     grid[0, 0].set_ylim(low - air, high + air)
     lines = grid[0, 0].get_legend_handles_labels()[0]
-    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
+    # Spans that a plane does not have are missing all the time.
+    gaps = ratio.isnull() & ratio.notnull().any("time")
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), title_fontsize=9.5,
+                  title=_SLACK.capitalize() if gaps.any() else None)  # fmt: skip
     style.head(figure, grid[0, 0], dataset, "Pulleys")
     return figure
 

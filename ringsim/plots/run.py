@@ -18,7 +18,8 @@ from ringsim.tables import known_to, unit_text, with_unit
 
 # The largest value of a run as a point of what is drawn: records stand at fixed times, so that
 # campaigns have one time axis, and a peak seldom falls on one.  Its value, time and place are
-# numbers of the dataset, and figures put them into the curve.
+# numbers of the dataset.  Figures put them into the curve of what is drawn alone; of curves that
+# are compared only one would get its peak, and look larger than the others: there it is a mark.
 
 
 class Peak(NamedTuple):
@@ -44,6 +45,18 @@ class Peak(NamedTuple):
             return times, heights
         at = int(np.searchsorted(times, self.time))
         return np.insert(times, at, self.time), np.insert(heights, at, factor * self.value)
+
+    def apart(self, values: xr.DataArray) -> str:
+        """What the curve (time,) of its place has instead of it, where records are too seldom."""
+        time = values["time"].to_numpy()
+        near = float(np.interp(self.time, time, values.to_numpy()))
+        if len(time) < 2 or abs(near - self.value) <= _ON_CURVE * abs(self.value):
+            return ""
+        return f"curves: records every {np.median(np.diff(time)):.3g} s"
+
+
+_ON_CURVE = 0.03
+"""Distance of a mark from its curve, over its height, that nobody sees."""
 
 
 def peak_of(
@@ -78,8 +91,14 @@ def label_of(dataset: xr.Dataset, name: str, nearby: xr.DataArray) -> Any:
     return held if held in dataset[str(nearby.name)].values else nearby.item()
 
 
-def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) -> None:
-    """A dot at a peak, and its value, time and place in words away from it and from curves."""
+def mark(
+    axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0,
+    curve: xr.DataArray | None = None,
+) -> None:  # fmt: skip
+    """A dot at a peak, and its value, time and place in words away from it and from curves.
+
+    ``curve`` (time,) is what was recorded at its place, if the peak is no point of it.
+    """
     if not math.isfinite(peak.value):
         return
     height = factor * peak.value
@@ -87,11 +106,13 @@ def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) ->
     units = unit_text(units)
     axes.plot(peak.time, height, "o", color=style.VERMILION, markersize=6, zorder=4, clip_on=False)
     early = peak.time < 0.5 * sum(axes.get_xlim())
+    apart = "" if curve is None else peak.apart(curve)
+    largest = "largest of all steps" if apart else "largest"
+    when = f"{largest}: {told} {units} at {peak.time:.4g} s"
     style.free(axes.text(
         0.98 if early else 0.02, 0.95 if early else 0.82,
-        f"largest: {told} {units} at {peak.time:.4g} s\n{place}".strip(), transform=axes.transAxes,
-        va="top", ha="right" if early else "left", color=style.VERMILION, bbox=style.PAPER,
-        zorder=5,
+        "\n".join(filter(None, [when, place, apart])), transform=axes.transAxes, va="top",
+        ha="right" if early else "left", color=style.VERMILION, bbox=style.PAPER, zorder=5,
     ))  # fmt: skip
 
 

@@ -168,10 +168,12 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     """
     words = str(variable.attrs.get("long_name", variable.name))
     units = str(variable.attrs.get("units", "1")) if units is None else units
-    if not words.startswith(f"{variable.name} = "):  # an output by an expression
+    if words.startswith(f"{variable.name} = "):  # by an expression: few blanks, wide letters
+        words, width = words.replace("(", "( "), int(0.9 * width)
+    else:
         words = words[:1].upper() + words[1:]
     held = unit_behind(words, units.replace(" ", FIXED))
-    return textwrap.fill(held, width).replace(FIXED, " ")
+    return textwrap.fill(held, width).replace("( ", "(").replace(FIXED, " ")
 
 
 def unit_label(variable: xr.DataArray) -> str:

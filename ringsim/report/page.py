@@ -342,4 +342,7 @@ def comparison_page(found: xr.Dataset, first: xr.Dataset, second: xr.Dataset) ->
             for name, each in zip(names, both, strict=True)
         ],
     }  # fmt: skip
-    return written("compare.html.j2", context, list(figures_of_both(found, first, second)))
+    # The lowest first: in print it has room below the numbers, where a high one begins a sheet.
+    figures = list(figures_of_both(found, first, second))
+    figures.sort(key=lambda each: float(each[2].get_figheight()))
+    return written("compare.html.j2", context, figures)

@@ -34,12 +34,11 @@ def written(
     Those named ``beside`` are not among these, but by their names in ``beside``.  They are lines as
     long as the page stays below ``LARGEST`` with them, then pictures.
     """
-    sizes = {name: tuple(figure.get_size_inches()) for name, _, figure in drawn}
     shape, text = _shell().get_template(template), ""
     each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
         figures = [(name, words, one.element(heavy)) for name, words, one in each]
-        text = shape.render({**context, **_apart(figures, beside), "sizes": sizes})
+        text = shape.render({**context, **_apart(figures, beside)})
         if len(text.encode("utf-8")) <= LARGEST:
             break
     return text
@@ -52,52 +51,13 @@ def _shell() -> jinja2.Environment:
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    shell.filters |= {"sentence": _sentence, "head": _head, "parted": _parted, "sheets": _sheets}
+    shell.filters |= {"sentence": _sentence, "head": _head, "parted": _parted}
     return shell
 
 
 def _apart(figures: list[tuple[str, str, str]], names: Collection[str]) -> dict[str, Any]:
     own = {each[0]: each for each in figures if each[0] in names}
     return {"figures": [each for each in figures if each[0] not in own], "beside": own}
-
-
-_SHEET = 7.1, 10.2
-"""Width and height of what is printed of a sheet below a heading, inch."""
-_CAPTION = 0.4
-"""Height of a caption and what is around it, inch."""
-_LEAST, _MOST = 0.57, 0.85
-"""Scales of printed figures: smaller letters could hardly be read, larger ones are those of texts;
-between them a sheet is full."""
-
-
-def sheets(figures: list[tuple[tuple[float, float], Any]]) -> list[tuple[float, list[Any]]]:
-    """Figures, each behind its size in inch, by the sheets of paper that print them, and the scale
-    of each sheet.
-
-    Each goes to the first sheet that has room: what does not fit would leave a sheet half empty.
-    """
-    made: list[list[tuple[tuple[float, float], Any]]] = []
-    for each in figures:
-        own = next((s for s in made if _height([*s, each], _LEAST) <= _SHEET[1]), None)
-        if own is None:
-            made.append(own := [])
-        own.append(each)
-    scales = np.arange(_MOST, _LEAST, -0.01).round(2).tolist()
-    return [
-        (next((s for s in scales if _height(own, s) <= _SHEET[1]), _LEAST), [f for _, f in own])
-        for own in made
-    ]
-
-
-@jinja2.pass_context
-def _sheets(context: jinja2.runtime.Context, some: list[tuple[str, str, str]]) -> list[Any]:
-    """The same for a template, which knows the sizes of its figures by their names."""
-    return sheets([(context["sizes"][one[0]], one) for one in some])
-
-
-def _height(figures: list[tuple[tuple[float, float], Any]], scale: float) -> float:
-    """What figures at a scale need of a sheet, none wider than it, inch."""
-    return sum(min(scale, _SHEET[0] / wide) * high + _CAPTION for (wide, high), _ in figures)
 
 
 def _sentence(line: str) -> str:

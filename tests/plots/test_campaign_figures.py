@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from made_campaign import made_campaign, with_motors
+from made_campaign import made_campaign, made_scene, with_motors
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -72,6 +72,20 @@ def test_lock_order_counts_ties_by_halves_and_what_stays_open() -> None:
     assert "all V-joints come to 180 deg in 2 samples" in words(lock_order(campaign))
 
 
+def test_bars_of_few_samples_have_their_share_in_words() -> None:
+    """One of a hundred is a line on the axis, which goes to all of them."""
+    campaign = made_campaign(100)
+    campaign["lock_time"][:] = 5.0
+    campaign["lock_time"][:, 0, 1] = 4.0
+    campaign["lock_time"][0, 0, 0] = 3.0
+    upper, lower = lock_order(campaign).axes
+    assert upper.get_ylim()[1] > 1.0
+    assert "100%" in [upper.yaxis.get_major_formatter()(tick) for tick in upper.get_yticks()]
+    texts = [(t.get_position()[0], t.get_text()) for t in upper.texts if t.get_text() == "1%"]
+    assert texts == [(campaign["section"].values[0], "1%")]
+    assert not [t for t in lower.texts if t.get_text() == "1%"]
+
+
 def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
     figure = distributions(mixed)
     values = np.sort(mixed["asynchrony_max"].values[GOOD])
@@ -86,6 +100,37 @@ def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
     np.testing.assert_allclose(dots.get_xdata(), told)
     one = distributions(made_campaign(1)).axes[0]
     assert not [line for line in one.lines if line.get_marker() == "o"]
+
+
+def test_loads_with_an_allowable_come_first_and_show_it() -> None:
+    campaign = with_motors(made_campaign(8))
+    every = [n for n, each in VARIABLES.items() if each.summary is not None and each.dtype == "f8"]
+    for name in every:
+        campaign[name] = "sample", 100.0 + np.arange(8.0), {"units": VARIABLES[name].units}
+    campaign["peak_tension"].values[:] = 20.0 + 1e-3 * np.arange(8.0)
+    campaign.attrs["requirements"] = "{}"
+    scene = made_scene()
+    assert "peak_tension" not in shown(campaign)[0]
+    for limit in (30.0, 500.0):
+        own = campaign.assign_attrs(scene=scene.with_values({"limits.tension": limit}).to_toml())
+        figure = distributions(own)
+        assert shown(own)[0][0] == "peak_tension"
+        panel = figure.axes[0]
+        at = [line.get_xdata()[0] for line in panel.lines if len(line.get_xdata()) == 2]
+        told = " ".join(text.get_text() for text in panel.texts)
+        # One far beyond all values would leave them at the edge.
+        near = limit < 100.0
+        assert (at == [limit], "limit 30 N" in told) == (near, near)
+        assert ("limit 500 N" in panel.get_title(loc="left")) is not near
+
+
+def test_labels_of_expressions_fit_their_panels() -> None:
+    text = "apart = max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
+    made = xr.DataArray(0.0, name="apart", attrs={"long_name": text, "units": "deg"})
+    told = style.label(made, width=38)
+    assert max(map(len, told.split("\n"))) <= 34
+    assert "".join(told.split()) == f"{text} (deg)".replace(" ", "")
+    assert "(\ndeg" not in told
 
 
 def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
@@ -154,6 +199,7 @@ def test_tension_by_span(mixed: xr.Dataset) -> None:
 
 def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     figure = by_input(mixed)
+    assert figure.get_suptitle().startswith("Asynchrony and outcome by input: ")
     points = {c.get_label(): c.get_offsets() for c in figure.axes[1].collections}
     assert {name: len(at) for name, at in points.items()} == {
         "deployed (5)": 5, "failed: timeout (2)": 2,
@@ -351,9 +397,12 @@ def test_of_blocks_figures_show_the_samples_that_the_analysis_takes() -> None:
 def test_convergence_draws_the_quantile_at_the_worse_end() -> None:
     made = with_motors(made_campaign(8))
     figure = convergence(made)
-    for name, level, label in (
-        ("least_drive_margin", 0.05, "5 % quantile"), ("peak_tension", 0.95, "95 % quantile"),
-    ):  # fmt: skip
+    label = "quantile at the worse end (95 %; 5 % where less is worse)"
+    told = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert [text for text in told if "quantile" in text] == [label]
+    plain = convergence(made_campaign(8)).legends[0].get_texts()
+    assert "95 % quantile, at the worse end" in [text.get_text() for text in plain]
+    for name, level in (("least_drive_margin", 0.05), ("peak_tension", 0.95)):
         own = style.plain(made[name].attrs["long_name"])[:12].lower()
         (axes,) = (a for a in figure.axes if a.get_title(loc="left").lower().startswith(own))
         (line,) = (each for each in axes.lines if each.get_label() == label)

@@ -10,7 +10,7 @@ from matplotlib.text import Text
 
 from ringsim.plots.figures import draw_figures
 from ringsim.plots.ring import strain_over_length, tension_over_length
-from ringsim.plots.rods_and_cables import cables, nodal_forces, rod_stress
+from ringsim.plots.rods_and_cables import cables, nodal_forces, pulleys, rod_stress
 from ringsim.plots.run import asynchrony, peak_of
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
@@ -44,8 +44,9 @@ def highest(figure: Figure, label: str) -> float:
         for axes in figure.axes
         if any(axes in one.get_shared_y_axes().get_siblings(one) for one in named)
     ]
+    marks = [line for axes in rows for line in axes.lines if line.get_marker() == "o"]
     drawn = [line.get_ydata() for axes in rows for line in axes.lines if len(line.get_ydata()) > 2]
-    return float(np.nanmax(np.concatenate(drawn)))
+    return float(np.nanmax(np.concatenate([*drawn, *(mark.get_ydata() for mark in marks)])))
 
 
 @pytest.mark.parametrize(("draw", "label", "number", "factor"), DRAWN)
@@ -53,7 +54,34 @@ def test_the_highest_point_is_the_number_of_the_summary(draw, label, number, fac
     figure = draw(truss)
     assert highest(figure, label) == factor * float(truss[number])
     words = " ".join(text.get_text() for text in figure.findobj(Text))
-    assert f"largest: {factor * float(truss[number]):.3g}" in words
+    largest = "largest" if draw is asynchrony else "largest of all steps"
+    assert f"{largest}: {factor * float(truss[number]):.3g}" in words
+
+
+def test_a_peak_between_records_is_in_no_curve_of_those_compared(truss):
+    """Of one plane alone: in its curve the other, recorded seldom, would look far smaller."""
+    rows = cables(truss).axes[6:]
+    curves = [line for axes in rows for line in axes.lines if len(line.get_xdata()) > 2]
+    assert len(curves) >= 2
+    for line in curves:
+        np.testing.assert_array_equal(line.get_xdata(), truss["time"])
+    words = [text.get_text() for axes in rows for text in axes.texts]
+    (told,) = (text for text in words if text.startswith("largest"))
+    assert told.startswith("largest of all steps: ")
+    assert told.endswith("curves: records every 0.25 s")
+    peak = peak_of(truss, "cable_tension", "peak_tension")
+    assert not peak.apart(xr.full_like(truss["time"], peak.value))
+
+
+@pytest.mark.parametrize(("draw", "taut"), [(cables, False), (pulleys, False), (pulleys, True)])
+def test_why_curves_stop_is_told(draw, taut, truss):
+    run = truss.copy(deep=True)
+    run["pulley_ratio"][:] = 0.9
+    if not taut:
+        run["cable_tension"][..., 1:] = 0.0
+        run["pulley_ratio"][..., 1:] = np.nan
+    told = draw(run).legends[0].get_title().get_text().lower()
+    assert ("no line where the rope before it is slack." in told) is not taut
 
 
 def test_these_peaks_are_in_no_record(truss):
@@ -76,10 +104,8 @@ def test_a_peak_stands_where_the_dataset_says(deployed):
     axes = rod_stress(run).axes[3]
     (mark,) = [line for line in axes.lines if line.get_marker() == "o"]
     assert (mark.get_xdata()[0], mark.get_ydata()[0]) == (4.04, 9.0)
-    (curve,) = [line for line in axes.lines if 4.04 in line.get_xdata() and line is not mark]
-    kept = curve.get_xdata() != 4.04
     wanted = deployed.rod_stress.sel(rod="bar_lower_left", section=5)
-    np.testing.assert_array_equal(curve.get_ydata()[kept], 1e-6 * wanted)
+    assert [line for line in axes.lines if np.array_equal(line.get_ydata(), 1e-6 * wanted)]
     assert "section 5, lower bar, left half" in axes.texts[-1].get_text()
 
 

@@ -140,6 +140,14 @@ def test_motors_of_a_run_have_a_panel_a_quantity(campaign: xr.Dataset) -> None:
         rows = run[name].transpose("plane", "winch", "time").to_numpy()[:, 0]
         for row, line in zip(rows, axes.lines, strict=False):
             assert line.get_ydata() == pytest.approx(row, nan_ok=True)
+    # A peak between two records stands beside the curves, which stay alike for both motors.
+    high = 9.0 * float(abs(run["motor_torque"]).max())
+    panel, _ = motors(run.assign(peak_motor_torque=high, peak_motor_torque_time=2.05)).axes
+    assert [len(line.get_xdata()) for line in panel.lines[:3]] == [len(run["time"])] * 2 + [1]
+    assert panel.lines[2].get_ydata().tolist() == [high]
+    (told,) = (t.get_text() for t in panel.texts if t.get_text().startswith("largest"))
+    assert told.startswith("largest of all steps: ")
+    assert "curves: records every" in told
     assert [t.get_text() for t in motors(run).legends[0].get_texts()] == [
         "upper cable", "lower cable",
     ]  # fmt: skip

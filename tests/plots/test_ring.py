@@ -9,7 +9,8 @@ import pytest
 from made_campaign import made_campaign, with_positions
 from matplotlib.collections import LineCollection
 
-from ringsim.plots.ring import facing_azimuth, instants, lines_at, ring, view
+import ringsim
+from ringsim.plots.ring import LOOKS, facing_azimuth, instants, lines_at, modes, ring, view
 from ringsim.scene import load_scene, scene_from_toml
 from ringsim.simulation import simulate
 
@@ -237,3 +238,23 @@ def test_more_states_are_equal_steps_of_the_mean_angle(deployed):
         assert abs(means[k] - wanted) <= 1.01 * float(abs(course.diff("time")).max())
     with pytest.raises(ValueError, match="states = 1 must be at least 2"):
         instants(deployed, 1)
+
+
+def test_shapes_of_modes_stand_below_their_words_with_the_spacecraft():
+    craft = {"mass": 800.0, "inertia": [1.0, 1.0, 1.0], "centre": [0.0, 0.0, 1.5]}
+    values = {"structure.sections": 3, "spacecraft": craft}
+    found = ringsim.modes(load_scene("ring18").with_values(values), ["deployed"], count=2)
+    figure = modes(found)
+    figure.draw_without_rendering()
+    (words,) = (text.get_text() for text in figure.texts if "shapes at 180 deg" in text.get_text())
+    rest = found["position"].isel(angle=-1).transpose("point", "axis").values
+    size = float(np.ptp(rest, axis=0).max())
+    assert f"the largest displacement is drawn as {0.14 * size:.3g} m, 14 % of" in words
+    assert "dot: the spacecraft's centre of mass" in words
+    for panel in figure.axes[1:]:
+        _, shape = [each for each in panel.collections if isinstance(each, LineCollection)]
+        drawn = np.concatenate(shape.get_segments())
+        high = panel.transData.transform(drawn)[:, 1].max()
+        assert high < panel.title.get_window_extent().y0
+        thin = max(shape.get_linewidths()) / LOOKS["boom"]["linewidth"]
+        assert thin == pytest.approx(11.0 / 5.0 * 0.8 / 1.3)

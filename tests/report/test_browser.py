@@ -158,15 +158,24 @@ def test_the_page_is_printed_with_what_it_folds(
     assert done.exit_code == 0, done.output
     printed = out.with_suffix(".pdf").read_bytes()
     assert printed.startswith(b"%PDF")
-    # Folded, the page has two sheets: the answer and the failures.
-    assert len(re.findall(rb"/Type\s*/Page\b", printed)) >= 4
+    # Folded, the page has two sheets: the answer and the failures.  None is begun for a figure.
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 3
     assert sorted(each.name for each in tmp_path.iterdir()) == [
         "campaign.nc", "made.html", "made.pdf",
     ]  # fmt: skip
 
 
 MEASURE = """<script>
-const seen = {boxes: {}, cells: [], room: 0};
+const seen = {boxes: {}, cells: [], room: 0, rows: [], drawn: []};
+for (const row of document.querySelectorAll("main tbody tr")) {
+  const words = Math.max(...[...row.cells].map(cell => cell.textContent.length));
+  if (words < 30) seen.rows.push(row.offsetHeight);
+}
+const figure = document.querySelector("figure");
+for (const _ of figure ? [1, 2, 3] : []) {  // as it is, enlarged, and as it was
+  seen.drawn.push(figure.firstElementChild.getBoundingClientRect().width);
+  figure.click();
+}
 for (const box of document.querySelectorAll(".wide")) {
   const name = box.querySelector("table").id;
   seen.boxes[name] = box.scrollWidth - box.clientWidth;
@@ -185,7 +194,8 @@ document.body.dataset.seen = JSON.stringify(seen);
 def test_tables_are_whole_on_a_wide_page_and_scroll_in_their_box_on_a_narrow_one(
     tmp_path: Path, width: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(figures, "PICTURES", figures.PICTURES[:1])
+    drawn = [each for each in figures.PICTURES if each.name == "lock_order"]
+    monkeypatch.setattr(figures, "PICTURES", drawn)
     campaign = made_campaign(24, failed=(2, 5))
     campaign["reason"] = campaign["reason"].astype(object)
     campaign["reason"][2] = "the step fell below its bound at 4 s: " + "set a smaller one, " * 5
@@ -204,6 +214,11 @@ def test_tables_are_whole_on_a_wide_page_and_scroll_in_their_box_on_a_narrow_one
     assert (seen["boxes"]["statistics-table"] <= 0) == (width == 1400)
     assert width == 500 or seen["room"] >= 1200  # px: numbers with error bars take 1100
     assert min(seen["cells"]) >= 200  # px: some words a line
+    # On a narrow page no row is high for words that are off the screen, and figures fit it.
+    assert width == 1400 or max(seen["rows"]) <= 30
+    first, large, again = seen["drawn"]
+    assert first == again < width
+    assert (large >= 640) == (width == 500 or first >= 640)
 
 
 @pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")

@@ -552,17 +552,17 @@ def test_a_table_without_a_figure_of_its_own_goes_before_the_figures(
     assert '<p class="note">.</p>' not in text
 
 
-def test_printed_figures_fill_their_sheets() -> None:
-    """A4 has 7.17 x 10.59 inch within its margins; what does not fit a sheet goes on another."""
-    sizes = [(11.1, 10.2), (8.6, 6.2), (10.5, 8.9), (8.4, 5.6), (9.8, 5.7), (10.5, 19.0)]
-    made = shell.sheets([(size, name) for name, size in enumerate(sizes)])
-    assert sorted(name for _, own in made for name in own) == list(range(len(sizes)))
-    for scale, own in made:
-        heights = [min(scale, 7.17 / sizes[k][0]) * sizes[k][1] + 0.385 for k in own]
-        assert 0.57 <= scale <= 0.85
-        assert len(own) == 1 or sum(heights) < 10.59 - 0.4  # of a heading
-    assert [own for _, own in made] == [[0, 1], [2, 3], [4], [5]]
-    assert made[2][0] == 0.85  # what is alone is drawn larger
+def test_what_can_be_broken_stands_behind_what_cannot() -> None:
+    """In print it fills what a figure or a listing leaves of a sheet; short tables stay whole."""
+    text = page(made_campaign(24), "runs/made")
+    order = ["figure-tornado", "matters-table", "The campaign's file", "model-table"]
+    places = [text.index(f'id="{name}"' if "-" in name else name) for name in order]
+    assert places == sorted(places)
+    boxes = re.findall(r'<div class="([^"]*)"><table id="([^"]*)">(.*?)</table>', text, re.DOTALL)
+    rows = {name: (kind, body.count("<tr") - 1) for kind, name, body in boxes}
+    assert any("short" in kind for kind, _ in rows.values())
+    for name, (kind, count) in rows.items():
+        assert ("short" in kind) == (count <= 16 and name != "model-table"), name
 
 
 @pytest.mark.usefixtures("_undrawn")

@@ -151,6 +151,8 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     assert "7 cells in 2 panels: 3 ended, 2 ok, 2 wrong" in text
     assert "1 of the ok cells after a restart" in summary(whole)
     assert NEWTON in text
+    assert "## Where ok ends" in text
+    assert "Where ok ends" not in to_markdown(joined([(WORDS, cells(GOOD))]))  # nothing ended
     figure = stability(whole)
     legend = [entry.get_text() for entry in figure.legends[0].get_texts()]
     assert legend == ["ok", "r  ok, after a restart", "t  cut off", "N  Newton",

@@ -278,6 +278,20 @@ def shares(campaign: xr.Dataset) -> tuple[Array, Array, Array]:
     return first, last, never
 
 
+_SMALL = 0.05
+"""Share up to which a bar is hardly seen, or how high it is."""
+
+
+def _name_small(axes: Axes, sections: Array, shares: list[Array]) -> None:
+    """Above each stack of bars the shares in it that are too small to be read off."""
+    for number, section in enumerate(sections):
+        own = [each[number] for each in shares]
+        told = [f"{100.0 * share:.2g}%" for share in own if 0.0 < share < _SMALL]
+        if told:
+            axes.text(section, sum(own) + 0.02, "\n".join(reversed(told)), ha="center", va="bottom",
+                      fontsize=8)  # fmt: skip
+
+
 @picture(
     "campaign", 70, "How often each V-joint comes to 180 deg first, last or not at all",
     ("lock_time",),
@@ -300,9 +314,11 @@ def lock_order(campaign: xr.Dataset) -> Figure:
             axes.bar(sections, table[row], 0.6, below, color=colour, hatch=hatch,
                      edgecolor="white", linewidth=0.3, label=label)  # fmt: skip
             below += table[row]
+        _name_small(axes, sections, [table[row] for _, table in drawn])
         axes.set_title(f"{plane} plane", fontsize=9.5)
         axes.grid(visible=False, axis="x")
     grid[0].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)
+    grid[0].set_ylim(0.0, 1.04)  # bars of all samples do not end with the axis
     grid[0].yaxis.set_major_formatter(PercentFormatter(1.0))
     grid[-1].set_xlabel(style.label(campaign["section"]))
     grid[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))

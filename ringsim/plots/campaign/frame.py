@@ -26,6 +26,7 @@ from ringsim.analysis.design import (
     endings,
     inputs,
     judged_by,
+    paths_of,
     placement,
     population_of,
     scalars,
@@ -43,9 +44,11 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.requirements import required_by
 from ringsim.analysis.worst import one_at_a_time
+from ringsim.outputs import OUTPUTS
 from ringsim.outputs.base import DOUBT
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
+from ringsim.scene import scene_from_toml
 from ringsim.tables import Table
 
 LOOKS = {
@@ -126,6 +129,26 @@ def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
     return wanted[name].limits if name in wanted else []
 
 
+def allowables(campaign: xr.Dataset) -> dict[str, float]:
+    """What limits of the scene allow of the largest values of loads, by output; not of limits that
+    are drawn, and differ from sample to sample.
+    """
+    if not (text := str(campaign.attrs.get("scene", ""))):
+        return {}
+    scene = scene_from_toml(text, source="attribute scene")
+    drawn = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
+    bounds = {
+        one.name: output.limit for output in OUTPUTS if output.limit
+        for one in output.variables if one.largest_of == output.variables[0].name
+    }  # fmt: skip
+    bounds["longest_slack"] = "slack_duration"
+    found = {
+        name: getattr(scene.limits, limit) for name, limit in bounds.items()
+        if name in campaign and f"limits.{limit}" not in drawn
+    }  # fmt: skip
+    return {name: float(limit) for name, limit in found.items() if limit is not None}
+
+
 def at_or_below(campaign: xr.Dataset, name: str) -> tuple[Array, Array]:
     """Values of a number in order, and the share of samples at or below none of them, the first,
     the second, ..., one more than there are values.
@@ -162,14 +185,14 @@ def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tupl
 
     ``what`` is what the figure draws of each, where that is not all.
 
-    All count if none differs.  If there are more, those with limits go first, then those that
-    differ most for their size.
+    All count if none differs.  Those with limits, of the campaign or of the scene, go first; if
+    there are more, then those that differ most for their size.
     """
-    limited, names = required_by(campaign.attrs), drawable(campaign)
+    limited, names = required_by(campaign.attrs) | allowables(campaign), drawable(campaign)
     flat, told = still(campaign, names)
     names = [name for name in names if name not in flat]
+    names.sort(key=lambda name: name not in limited)
     if len(names) > most:
-        names.sort(key=lambda name: name not in limited)
         order = sorted(names, key=lambda name: (name not in limited, -_spread(campaign, name)))
         others = [name for name in names if name in order[most:]]
         told += f" Not drawn for want of room: {what}{', '.join(others)}."
@@ -187,7 +210,7 @@ def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
     """Those of some numbers that differ so little between samples that no figure shows it, and a
     sentence that says so; none if all do, or where something is required of them.
     """
-    limited = required_by(campaign.attrs)
+    limited = required_by(campaign.attrs) | allowables(campaign)
     known = {name: values_of(campaign, name)[1] for name in names if name not in limited}
     flat = [
         name for name, values in known.items() if len(values) > 1

@@ -33,6 +33,7 @@ from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
     MOST_PANELS,
     WIDE,
+    allowables,
     at_or_below,
     head,
     in_lines,
@@ -44,7 +45,7 @@ from ringsim.plots.campaign.frame import (
     standing,
 )
 from ringsim.plots.campaign.tornado import is_one_by_one
-from ringsim.tables import unit_behind, with_unit
+from ringsim.tables import readable, unit_behind, with_unit
 
 _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
@@ -75,7 +76,9 @@ def distributions(campaign: xr.Dataset) -> Figure:
     campaign, blocks = standing(campaign)
     names, flat = shown(campaign)
     figure, panels, columns = style.new_panels(len(names), 3.7, 3.0, 0.9)
-    short, limited = False, any(limits(campaign, name) for name in names)
+    short, allowed = False, allowables(campaign)
+    rows = 1 if any(limits(campaign, name) or name in allowed for name in names) else 0
+    rows += any(limits(campaign, name) and name in allowed for name in names)
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
         values, share = at_or_below(campaign, name)
         short = short or share[0] > 0.0 or share[-1] < 1.0
@@ -86,20 +89,25 @@ def distributions(campaign: xr.Dataset) -> Figure:
             heights = share[0] + np.array(_LEVELS) * (share[-1] - share[0])
             axes.plot(quantile(values, _LEVELS), heights, "o", color=style.INK, markersize=4,
                       clip_on=False, zorder=4)  # fmt: skip
-        for word, limit in limits(campaign, name):
-            axes.axvline(limit, color=style.VERMILION, linestyle=(0, (5, 2)), linewidth=1.3)
+        words = f"n = {len(values)} of {campaign.sizes['sample']}"
+        bounds = [(word, limit, 0) for word, limit in limits(campaign, name)]
+        if name in allowed and _FAR * allowed[name] > np.abs(values).max(initial=0.0):
+            words += f"; limit {_told(campaign[name], allowed[name])}"
+        elif name in allowed:
+            bounds.append(("limit", allowed[name], 1 if bounds else 0))
+        for word, limit, row in bounds:
+            axes.axvline(limit, color=style.VERMILION, linewidth=1.3,
+                         linestyle=(0, (5, 2) if word != "limit" else (1.5, 1.5)))  # fmt: skip
             # Above the frame, where no curve runs.
-            units = str(campaign[name].attrs.get("units", "1"))
-            axes.annotate(f"{word} {with_unit(f'{limit:g}', units)}", (limit, 1.0), ha="center",
-                          color=style.VERMILION, xycoords=axes.get_xaxis_transform(),
-                          textcoords="offset points", xytext=(0, 2), fontsize=9)  # fmt: skip
+            axes.annotate(f"{word} {_told(campaign[name], limit)}", (limit, 1.0), ha="center",
+                          color=style.VERMILION, xycoords=axes.get_xaxis_transform(), fontsize=9,
+                          textcoords="offset points", xytext=(0, 2 + 12 * row))  # fmt: skip
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         style.plain_numbers(axes.xaxis)
         axes.set_xlabel(style.label(campaign[name], width=38))
         style.few_ticks(axes)
-        words = f"n = {len(values)} of {campaign.sizes['sample']}"
-        axes.set_title(words, fontsize=9, pad=16.0 if limited else None)
+        axes.set_title(words, fontsize=9, pad=4.0 + 12.0 * rows if rows else None)
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
     most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
@@ -112,6 +120,15 @@ def distributions(campaign: xr.Dataset) -> Figure:
         )
     head(figure, campaign, "Distributions", f"{told(campaign, most)}.{notes}")
     return figure
+
+
+_FAR = 0.3
+"""Share of an allowable below which values would stand at the edge of an axis that has both."""
+
+
+def _told(variable: xr.DataArray, limit: float) -> str:
+    factor, units = readable(str(variable.attrs.get("units", "1")), abs(limit))
+    return with_unit(f"{factor * limit:g}", units)
 
 
 _POINTS = 400
@@ -212,10 +229,13 @@ def convergence(campaign: xr.Dataset) -> Figure:
         )
     count = len(names) + len(wanted)
     figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3, most=_COLUMNS)
-    for axes, name in zip(panels, names, strict=False):
+    # The end that an engineer fears; one name for both, which are drawn alike.
+    levels = [0.05 if VARIABLES[name].badness < 0 else 0.95 for name in names]
+    worse = "quantile at the worse end (95 %; 5 % where less is worse)"
+    if len(set(levels)) == 1:
+        worse = f"{100 * levels[0]:.0f} % quantile, at the worse end"
+    for axes, name, level in zip(panels, names, levels, strict=False):
         samples, values = values_of(campaign, name)
-        # The end that an engineer fears.
-        level = 0.05 if VARIABLES[name].badness < 0 else 0.95
         counts, mean, far = running(values, level)
         known, ends = band(values, samples, placed)
         if len(known):
@@ -224,7 +244,7 @@ def convergence(campaign: xr.Dataset) -> Figure:
         size = 2.5 if len(counts) < 50 else 0.0
         axes.plot(counts, mean, color=style.BLUE, label="mean", marker="o", markersize=size)
         axes.plot(counts, far, color=style.VERMILION, linestyle="dashed", marker="s",
-                  markersize=size, label=f"{level:.0%} quantile".replace("%", " %"))  # fmt: skip
+                  markersize=size, label=worse)  # fmt: skip
         axes.ticklabel_format(axis="y", useOffset=False)
         _named(axes, style.label(campaign[name], width=42), len(values))
     for axes, (name, each) in zip(panels[len(names) :], wanted.items(), strict=True):
@@ -342,7 +362,10 @@ def by_input(campaign: xr.Dataset) -> Figure:
     if others > 0:
         note += f" Not drawn: {others} inputs whose rank correlation with the number is smaller."
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
-    head(figure, campaign, "Outcome by input", f"{count}{below}.{note}")
+    # asynchrony_max, deployment_time
+    judged = f"{name.removesuffix('_max').replace('_', ' ')} and outcome by input"
+    subject = f"{judged[0].upper()}{judged[1:]}" if name else "Outcome by input"
+    head(figure, campaign, subject, f"{count}{below}.{note}")
     return figure
 
 
