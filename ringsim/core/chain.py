@@ -21,7 +21,6 @@ from ringsim.core.tension import (
     Spans,
     factors_needed,
     measure,
-    of_ropes,
     slide,
     tension_changes,
     tighten,
@@ -155,37 +154,10 @@ class Chain:
         wound: Array, wound_rate: Array,
     ) -> ChainState:  # fmt: skip
         """What the spans tell, whose tensions are known."""
-        told, at_pulleys = of_ropes(table, drums, spans, ropes.behind, log_decays)
-        paths, path_rates, strains, strain_rates, forces, means, viscous, density = told
-        return ChainState(
-            ropes=ropes,
-            material=self.material[:, ropes.cable],
-            lengths=spans.length.copy(),
-            rates=spans.rate.copy(),
-            directions=spans.unit.copy(),
-            angles=spans.angle.copy(),
-            log_decays=log_decays,
-            friction=self.friction,
-            speeds=spans.speed.copy(),
-            exponents=spans.exponent.copy(),
-            slip_speeds=self.slip_speed,
-            shares=spans.share.copy(),
-            tensions=spans.tension.copy(),
-            paths=paths,
-            path_rates=path_rates,
-            natural=drums.natural.copy(),
-            wound_rates=drums.winding.copy(),
-            strains=strains,
-            strain_rates=strain_rates,
-            forces=forces,
-            mean_tensions=means,
-            viscous_forces=viscous,
-            energy_density=density,
-            friction_forces=at_pulleys[0],
-            held_beyond=at_pulleys[1],
-            wound=wound,
-            wound_rate=wound_rate,
-        )
+        ends = _whole(wound), _whole(wound_rate)
+        numbers = np.empty(ropes.places["wound_rate"].stop)
+        call("read_chain", table, ropes.behind, drums, spans, log_decays, *ends, numbers)
+        return ChainState(ropes, table.material.T, self.friction, self.slip_speed, numbers)
 
     def changes(
         self, state: ChainState, velocities: Array, slopes: Array, left: Array, by_place: float,

@@ -130,19 +130,6 @@ def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> 
     call("tighten", table, drums, log_decays, spans)
 
 
-def of_ropes(
-    table: RopeTable, drums: Drums, spans: Spans, behind: Indices, log_decays: Array
-) -> tuple[Array, Array]:
-    """Of ropes whose spans are known, shape (8, ropes): paths and their rates, strains and theirs,
-    forces before slack, mean tensions and their viscous parts (N), and elastic energies per natural
-    length (J/m); of pulleys, shape (2, pulleys): tension lost times stretch (N), and natural length
-    up to the rope's far end (m).
-    """
-    out, pulleys = np.zeros((8, len(table.starts))), np.zeros((2, len(behind)))
-    call("of_ropes", table, drums, spans, behind, log_decays, out, pulleys)
-    return out, pulleys
-
-
 # Derivatives of the cable's forces after positions and velocities of its points.
 #
 # Every span pulls with f_i = T_i u_i, so with the differences D x = x_i+1 - x_i of the points

@@ -109,8 +109,7 @@ typedef struct {
 } Pose;
 
 typedef struct {
-    Reals now, before;
-    D lead;
+    Reals now, before, lead;
 } Strains;
 
 /* ringsim.frame.elimination */
@@ -176,6 +175,7 @@ typedef struct {
     Pose pose;
     Reals hub;
     Followed followed;
+    Strains strains;
 } State;
 
 typedef struct {

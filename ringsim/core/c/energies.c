@@ -37,12 +37,12 @@ static D lost_between(const D *before, const D *after, I n, D step) {
 
 /* Read a state: what takes energy there, shape (3, n), and what is told of it.  Kept is the same of
    the state so long before, or empty. */
-void read_energies(const System *system, const State *now, const Strains *strains, D step,
-                   D *passing, I n_passing, const D *kept, I n_kept, D *told, I n_told) {
+void read_energies(const System *system, const State *now, D step, D *passing, I n_passing, const D *kept, I n_kept, D *told, I n_told) {
     (void)n_told;
     const Mesh *mesh = &system->mesh;
     const Held *held = &system->held;
     const Web *web = &system->web;
+    const Strains *strains = &now->strains;
     const I *cuts = held->cuts.at;
     const D *rate = now->followed.rate.at;
     const D *angles = now->pose.angle.at, *turning = rate + cuts[ANGLES];
@@ -71,9 +71,10 @@ void read_energies(const System *system, const State *now, const Strains *strain
         told[KINETIC] += 0.5 * web->hub_mass * dot(moving, moving);
     }
 
+    D lead = strains->lead.at[0];
     I before = first + count + web->first.n;
     for (I k = 0; k < each - before; k++) {
-        D straining = strains->lead * strains->now.at[k] + strains->before.at[k];
+        D straining = lead * strains->now.at[k] + strains->before.at[k];
         passing[before + k] = mesh->tau.at[k / 6] * mesh->stiffness.at[k] * straining;
         passing[each + before + k] = strains->now.at[k];
         passing[2 * each + before + k] = straining;
