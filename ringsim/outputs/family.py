@@ -283,6 +283,9 @@ SPAN_NAME = Variable("span_name", ("plane", "span"), "1", "ends of the span", "s
 """Coordinate of every result that has spans; empty where a plane's cable has fewer."""
 
 
+_NOTHING = np.empty(0)
+
+
 class Output:
     """An output, or a few that are computed together; every run that needs it has its own."""
 
@@ -299,6 +302,8 @@ class Output:
     """Field of ``ringsim.parts.solver.Limits`` that its largest reading must not pass."""
     of_antenna: ClassVar[bool] = True
     """Whether it tells of the antenna, so that engines are compared by it, not of the run."""
+    late: ClassVar[bool] = False
+    """Whether it reads many instants at once, which stand along the first axis, behind them."""
     rank: ClassVar[int] = 50
     """Place among the outputs in files and summaries; the smaller the earlier."""
 
@@ -316,7 +321,7 @@ class Output:
 
     def read(self, now: Reading) -> Array | float | None:
         """What to keep of the state after an accepted step; None if this run does not tell it."""
-        return np.empty(0)
+        return _NOTHING
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Values of its variables, from what ``read`` gave at all instants of a run.

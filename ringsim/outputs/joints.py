@@ -394,6 +394,7 @@ def _rest(times: Array, rates: Array, begun: int, lock: float) -> float:
 class JointGaps(Output):
     """Largest distance of points that a joint should hold together."""
 
+    late = True
     rank = 61
     of_antenna = False
     variables = (
