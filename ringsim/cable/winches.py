@@ -216,10 +216,9 @@ def root_of_rising(
 
 def driving(winches: Mapping[tuple[int, int], Winch], time: float, state: ChainState) -> bool:
     """Whether any winch, by cable and end, turns or will turn on a rope that is whole."""
-    whole = state.ropes.alive[state.ropes.of_end]
+    whole, rate = state.ropes.alive[state.ropes.of_end], state.wound_rate
     return any(
-        whole[place] and winch.drives(time, float(state.wound_rate[place]))
-        for place, winch in winches.items()
+        whole[place] and winch.drives(time, float(rate[place])) for place, winch in winches.items()
     )
 
 
