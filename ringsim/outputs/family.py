@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -16,7 +17,7 @@ from ringsim.outputs.meters import Reading
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Array
-from ringsim.stepping.locks import history
+from ringsim.stepping.locks import History, history
 from ringsim.variables import ErrorBar, Variable
 
 # Readings over time, and a run that has ended.
@@ -103,15 +104,19 @@ class Run:
             for (begin, end), scene in zip(bounds, scenes, strict=True)
         ]
 
-    @property
+    @cached_property
+    def history(self) -> History:
+        """What became of the latches."""
+        return history(self.scene, self.angles.times, self.angles.values, self.rates.values)
+
+    @cached_property
     def held(self) -> Array:
         """When each V-joint locked, shape (planes, sections), s: when its latch caught, or, without
         latches, when it reached 180 deg; NaN if it did not.
         """
         if self.scene.stop is None or not self.scene.stop.latch:
             return self.locks
-        series = self.angles.times, self.angles.values, self.rates.values
-        caught_at = history(self.scene, *series).caught_at
+        caught_at = self.history.caught_at
         if self.caught is None:
             return caught_at
         # A run that went on may have had other latches before.
