@@ -1,7 +1,8 @@
-"""The state of the tension chain: what its ropes, pulleys and winches tell, and their work."""
+"""The state of the tension chain: what its ropes, pulleys and winches tell."""
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from ringsim.cable.friction import LEAST_TENSION, Friction, Pulleys
 from ringsim.cable.ropes import PARTS, Array, Flags, Ropes
 from ringsim.cable.winding import WinchReading
 
-# The chain at one instant: tensions, forces, powers; and its work between two instants.
+# The chain at one instant: tensions, forces, powers.
 
 
 ROUNDED = 1e-12
@@ -35,12 +36,10 @@ class ChainState:
     """All spans, pulleys and ropes at one instant, or at many; see ``ringsim.core.tension``."""
 
     ropes: Ropes
-    material: Array
-    """EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope, shape (3, ropes)."""
+    table: Any
+    """The same as the core takes it (``ringsim.core.tension.RopeTable``)."""
     friction: Friction
     """The laws of ``log_decays``, and their derivatives, which forces do not need."""
-    slip_speeds: Array
-    """Speed that regularises the exponents (m/s), shape (pulleys,)."""
     numbers: Array
     """All that follows, in a row."""
     lengths, rates = _Part(), _Part()
@@ -74,6 +73,16 @@ class ChainState:
     """Natural length from each pulley to its rope's far end, m."""
     wound, wound_rate = _Part(), _Part()
     """Of the winches at both ends of each cable, m and m/s."""
+
+    @property
+    def material(self) -> Array:
+        """EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope, shape (3, ropes)."""
+        return np.asarray(self.table.material.T)
+
+    @property
+    def slip_speeds(self) -> Array:
+        """Speed that regularises the exponents (m/s), shape (pulleys,)."""
+        return np.asarray(self.table.slip_speed)
 
     @property
     def exponent_slopes(self) -> Array:
@@ -169,30 +178,6 @@ class ChainState:
 
         path_rate = float(self.path_rates[rope] + self.wound_rates[rope]) - present
         return WinchReading(tension_ratio=ratio, path_rate=path_rate, path_slope=path_slope)
-
-
-def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
-    """Energies in J: put in by the winches, less what is wound up; lost by friction, damping.
-
-    The work of a force is its mean at both instants times the displacement: rope wound on a drum,
-    rope slipped over a pulley, strain of a rope.  Products of force and rate at the instants alone
-    would miss the displacement between them.  Nothing moves while a fault changes the ropes.
-    Source: the energy balance of Belytschko, Liu and Moran, Nonlinear Finite Elements for
-    Continua and Structures (2000), sec. 6.2.3.
-    """
-    ropes = after.ropes
-    if before.ropes is not ropes:
-        return 0.0, 0.0
-    wound = after.wound - before.wound
-    pulls = before.winch_forces + after.winch_forces
-    carried = before.energy_density + after.energy_density
-    slipped = before.held_beyond - after.held_beyond
-    slipped -= ropes.winds_beyond * wound[ropes.cable_of_pulley, 1]
-    rubbing = before.friction_forces + after.friction_forces
-    viscous = before.viscous_forces + after.viscous_forces
-    strained = 0.5 * (before.natural + after.natural) * (after.strains - before.strains)
-    driven = 0.5 * (np.vdot(pulls, wound) - carried @ ropes.per_rope(wound))
-    return float(driven), 0.5 * float(rubbing @ slipped + viscous @ strained)
 
 
 def pulley_tensions(ropes: Ropes, tensions: Array) -> Array:

@@ -113,16 +113,6 @@ class Ropes:
         return self.of_span[self.behind]
 
     @cached_property
-    def cable_of_pulley(self) -> Indices:
-        """Cable of each pulley, shape (pulleys,)."""
-        return self.cable[self.of_pulley]
-
-    @cached_property
-    def winds_beyond(self) -> Flags:
-        """Whether the rope behind each pulley ends at its cable's far end, shape (pulleys,)."""
-        return np.asarray(self.of_end[self.cable_of_pulley, 1] == self.of_pulley)
-
-    @cached_property
     def slips(self) -> Array:
         """1 where the rope slips over the pulley, 0 where it is jammed, shape (pulleys,)."""
         return np.asarray(~np.isin(self.behind, self.starts), dtype=float)

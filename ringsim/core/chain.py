@@ -157,7 +157,7 @@ class Chain:
         ends = _whole(wound), _whole(wound_rate)
         numbers = np.empty(ropes.places["wound_rate"].stop)
         call("read_chain", table, ropes.behind, drums, spans, log_decays, *ends, numbers)
-        return ChainState(ropes, table.material.T, self.friction, self.slip_speed, numbers)
+        return ChainState(ropes, table, self.friction, numbers)
 
     def changes(
         self, state: ChainState, velocities: Array, slopes: Array, left: Array, by_place: float,
@@ -185,7 +185,7 @@ class Chain:
         turning = np.zeros(len(ropes.starts), dtype=bool)
         turning[own[slips & (np.abs(slopes) * slip >= passing)]] = True
         slopes = np.where(turning[own], np.where(slopes == 0.0, _LEAST_SLOPE, slopes), 0.0)
-        table = self.table(ropes)
+        table = state.table
         spans = Spans(
             state.lengths, state.rates, state.directions, state.angles, state.tensions,
             state.shares, state.exponents, state.speeds,
@@ -219,6 +219,22 @@ class Chain:
 def _whole(numbers: Array) -> Array:
     """As the core takes them: laws may give whole numbers, and callers parts of arrays."""
     return np.ascontiguousarray(numbers, dtype=float)
+
+
+def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
+    """Energies in J: put in by the winches, less what is wound up; lost by friction, damping.
+
+    The work of a force is its mean at both instants times the displacement: rope wound on a drum,
+    rope slipped over a pulley, strain of a rope.  Products of force and rate at the instants alone
+    would miss the displacement between them.  Nothing moves while a fault changes the ropes.
+    Source: the energy balance of Belytschko, Liu and Moran, Nonlinear Finite Elements for
+    Continua and Structures (2000), sec. 6.2.3.
+    """
+    works = np.zeros(2)
+    if before.ropes is after.ropes:
+        rows = before.numbers, after.numbers
+        call("work_of_ropes", after.table, after.ropes.behind, *rows, works)
+    return float(works[0]), float(works[1])
 
 
 # What Newton's iterates of one step tell of dry friction (turning.c).

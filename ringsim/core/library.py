@@ -58,6 +58,7 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "slide": ("ttt", _NONE),
     "tighten": ("ttat", _NONE),
     "read_chain": ("tnttaaaa", _NONE),
+    "work_of_ropes": ("tnaaa", _NONE),
     "pull_tight": ("tnttaat", _REAL),
     "factors_needed": ("ta", _WHOLE),
     "tension_changes": ("ttaaataarraa", _NONE),

@@ -6,7 +6,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from ringsim.cable.chain import ChainState, work_between
+from ringsim.cable.chain import ChainState
+from ringsim.core.chain import work_between
 from ringsim.core.library import call
 from ringsim.frame.mesh import Indices, Mesh
 from ringsim.frame.model import FrameModel
