@@ -279,7 +279,7 @@ class Winches:
 
     def _prescribed(self, time: float) -> tuple[Array, Array]:
         """As ``at``, while all that answer to their ropes stand still."""
-        wound, speed, begin = self._held.copy(), np.zeros_like(self._held), self._start
+        wound, speed, begin = self._held.copy(), np.zeros(self._held.shape), self._start
         inside = max(time - AT_ONCE, 0.5 * (begin + time))
         moment = inside if time > begin else time + AT_ONCE
         for place, winch in self._winches.items():

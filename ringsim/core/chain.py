@@ -113,7 +113,8 @@ class Chain:
             the friction.
         """
         table, spans = self._measured(ropes, points, velocities)
-        drums = self.drums(ropes, wound, wound_rate)
+        drums = Drums.still(len(ropes.starts))
+        drums.wind(table, _whole(wound), _whole(wound_rate))
         if not drums.natural.min() > 0.0:
             short = int(np.argmin(drums.natural))
             raise ValueError(
@@ -142,12 +143,6 @@ class Chain:
         """Ropes in numbers; ``felt`` are the spans that are, by default all."""
         every = np.arange(ropes.spans)
         return RopeTable.of(ropes, self.material, self.slip_speed, every if felt is None else felt)
-
-    def drums(self, ropes: Ropes, wound: Array, wound_rate: Array) -> Drums:
-        """Ropes whose winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
-        inflow = np.zeros(len(ropes.starts))
-        inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
-        return Drums(ropes.content - ropes.per_rope(wound), ropes.per_rope(wound_rate), inflow)
 
     def read(
         self, ropes: Ropes, table: RopeTable, drums: Drums, spans: Spans, log_decays: Array,

@@ -55,6 +55,7 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "solve": ("tta", _NONE),
     "solve_one": ("tta", _NONE),
     "measure": ("tnaat", _REAL),
+    "wind": ("taat", _NONE),
     "slide": ("ttt", _NONE),
     "tighten": ("ttat", _NONE),
     "read_chain": ("tnttaaaa", _NONE),

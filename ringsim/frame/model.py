@@ -255,6 +255,8 @@ class FrameModel:
         except ValueError as error:  # the winches or the ropes have no answer
             how, why = _NO_TENSIONS, str(error)
         iterations, tangents, norm = int(told[0]), int(told[1]), float(told[2])
+        if how == _BALANCED:
+            return Balanced(iterations, tangents, "")
         words = {
             _UNBALANCED: f"Newton's residual is {norm:.3g} N after {iterations} iterations, "
             f"step {step:.3g} s",

@@ -80,13 +80,15 @@ class Locks(Remembering):
 
     def note(self, angles: Array) -> None:
         """Remember the joints that have reached a stop; opening angles in rad."""
-        self.deployed |= angles >= math.pi
-        self.stowed |= self._away & (angles <= self._stowed_angle)
-        off = angles > self._stowed_angle + _NEAR
-        self._away |= off
-        if self.reached is Fate.FOLDED and off.all():
+        low, stop = float(angles.min()), self._stowed_angle
+        if angles.max() >= math.pi:
+            self.deployed |= angles >= math.pi
+        if low <= stop:
+            self.stowed |= self._away & (angles <= stop)
+        self._away |= angles > stop + _NEAR
+        if self.reached is Fate.FOLDED and low > stop + _NEAR:
             self.reached, self.stowed = Fate.NONE, np.zeros_like(self.stowed)
-        elif self.reached is not Fate.FOLDED and self.stowed.all():
+        elif self.reached is not Fate.FOLDED and low <= stop and self.stowed.all():
             self.reached, self.deployed = Fate.FOLDED, np.zeros_like(self.deployed)
         elif self.reached is Fate.NONE and self.deployed.all():
             self.reached = Fate.DEPLOYED

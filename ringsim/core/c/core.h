@@ -209,7 +209,7 @@ typedef struct {
 /* ringsim.core.tension */
 typedef struct {
     Ints starts, ends, near, pulley, felt;
-    Reals alive, material, slip_speed;
+    Reals content, alive, material, slip_speed;
 } Ropes;
 
 typedef struct {

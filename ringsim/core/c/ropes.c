@@ -44,6 +44,35 @@ static Path path_of(const Ropes *ropes, const Spans *spans, I rope) {
     return found;
 }
 
+/* Number of a rope's cable, and whether the rope is at its beginning and at its end. */
+typedef struct {
+    I cable;
+    bool begins, ends;
+} Place;
+
+/* Of the rope behind another one, whose place this is; of the first one behind {-1}. */
+static Place place_behind(const Ropes *ropes, I rope, Place before) {
+    const I *near = ropes->near.at, first = ropes->starts.at[rope], behind = ropes->ends.at[rope];
+    bool begins = first == 0 || near[first] != near[first - 1] + 1;
+    bool ends = behind == ropes->near.n || near[behind] != near[behind - 1] + 1;
+    return (Place){before.cable + begins, begins, ends};
+}
+
+/* Let the winches at both ends of each cable have wound so much (m), at rates (m/s). */
+void wind(const Ropes *ropes, const D *wound, I n_wound, const D *rates, I n_rates, const Drums *drums) {
+    (void)n_wound, (void)n_rates;
+    Place place = {-1, false, false};
+    for (I rope = 0; rope < ropes->starts.n; rope++) {
+        place = place_behind(ropes, rope, place);
+        const D *turned = wound + 2 * place.cable, *rate = rates + 2 * place.cable;
+        D near = place.begins ? turned[0] : 0.0, far = place.ends ? turned[1] : 0.0;
+        drums->natural.at[rope] = ropes->content.at[rope] - (near + far);
+        near = place.begins ? rate[0] : 0.0, far = place.ends ? rate[1] : 0.0;
+        drums->winding.at[rope] = near + far;
+        drums->inflow.at[rope] = -far;
+    }
+}
+
 /* Speeds of the ropes over the pulleys, and exponents of their friction. */
 void slide(const Ropes *ropes, const Drums *drums, const Spans *spans) {
     for (I rope = 0; rope < ropes->starts.n; rope++) {
@@ -179,15 +208,14 @@ void work_of_ropes(const Ropes *ropes, const I *behind, I pulleys, const D *befo
     (void)n_before, (void)n_after, (void)n_out;
     I count = ropes->starts.n, n = ropes->near.n, forces = 7 * n + 4 * pulleys, held = forces + pulleys;
     I natural = held + pulleys, strains = natural + 4 * count, viscous = natural + 8 * count;
-    I density = viscous + count, wound = density + count, cable = -1, j = 0;
+    I density = viscous + count, wound = density + count, j = 0;
+    Place place = {-1, false, false};
     D driven = 0.0, lost = 0.0;
     for (I rope = 0; rope < count; rope++) {
         I first = ropes->starts.at[rope], last = ropes->ends.at[rope] - 1;
-        bool begins = first == 0 || ropes->near.at[first] != ropes->near.at[first - 1] + 1;
-        bool ends = last == n - 1 || ropes->near.at[last + 1] != ropes->near.at[last] + 1;
-        cable += begins;
-        const D *turned = after + wound + 2 * cable, *had = before + wound + 2 * cable;
-        D near = begins ? turned[0] - had[0] : 0.0, far = ends ? turned[1] - had[1] : 0.0;
+        place = place_behind(ropes, rope, place);
+        const D *turned = after + wound + 2 * place.cable, *had = before + wound + 2 * place.cable;
+        D near = place.begins ? turned[0] - had[0] : 0.0, far = place.ends ? turned[1] - had[1] : 0.0;
         D one = before[strains + rope], two = after[strains + rope];
         driven += (before[2 * n + first] * (1.0 + one) + after[2 * n + first] * (1.0 + two)) * near;
         driven += (before[2 * n + last] * (1.0 + one) + after[2 * n + last] * (1.0 + two)) * far;
