@@ -288,9 +288,6 @@ SPAN_NAME = Variable("span_name", ("plane", "span"), "1", "ends of the span", "s
 """Coordinate of every result that has spans; empty where a plane's cable has fewer."""
 
 
-_NOTHING = np.empty(0)
-
-
 class Output:
     """An output, or a few that are computed together; every run that needs it has its own."""
 
@@ -308,7 +305,8 @@ class Output:
     of_antenna: ClassVar[bool] = True
     """Whether it tells of the antenna, so that engines are compared by it, not of the run."""
     late: ClassVar[bool] = False
-    """Whether it reads many instants at once, which stand along the first axis, behind them."""
+    """Whether it reads many instants at once, which stand along the first axis, behind them; as
+    those do that read nothing."""
     rank: ClassVar[int] = 50
     """Place among the outputs in files and summaries; the smaller the earlier."""
 
@@ -317,6 +315,8 @@ class Output:
         twice = sorted(_declared(cls).keys() & (VARIABLES.keys() | COORDINATES.keys()))
         if twice:
             raise ValueError(f"{cls.__module__}: there is an output {twice[0]} already: rename it")
+        own = vars(cls)  # what reads in its own way says itself whether it does so late
+        cls.late = own.get("late", "read" not in own and (cls.late or cls.read is Output.read))
         COORDINATES.update({variable.name: variable for variable in cls.coordinates})
         OUTPUTS.append(cls)
         OUTPUTS.sort(key=lambda output: output.rank)
@@ -326,7 +326,7 @@ class Output:
 
     def read(self, now: Reading) -> Array | float | None:
         """What to keep of the state after an accepted step; None if this run does not tell it."""
-        return _NOTHING
+        return np.empty((*np.shape(now.time), 0))
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Values of its variables, from what ``read`` gave at all instants of a run.

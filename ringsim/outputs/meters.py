@@ -216,15 +216,15 @@ class Reading(Instant):
         return self.meters.switches.torques("stop", np.pi - self.angles, -self.rates)
 
 
-def together(steps: Sequence[Reading]) -> Reading:
-    """What was read at many instants with the same ropes, as one reading: what changes stands along
-    the first axis; ``meters`` look at another state by now.
+def together(steps: Sequence[Reading], energies: Sequence[Energies]) -> Reading:
+    """What was read at many instants with the same ropes, with energies since the start, as one
+    reading: what changes stands along the first axis; ``meters`` look at another state by now.
     """
     first, changed = steps[0], dict[str, Any]()
     for name in ("time", "angles", "rates", "gap", "commands"):
         if getattr(first, name) is not None:
             changed[name] = np.array([getattr(one, name) for one in steps])
-    changed["energies"] = Energies(*np.array([one.energies for one in steps]).T)
+    changed["energies"] = Energies(*np.array(energies).T)
     if first.chain is not None:
         numbers = np.array([one.chain.numbers for one in steps if one.chain is not None])
         changed["chain"] = replace(first.chain, numbers=numbers)

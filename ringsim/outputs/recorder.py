@@ -57,7 +57,7 @@ class Recorder(Remembering):
         """Begin a run; ``coordinates`` are those that its outputs declare themselves."""
         self._scene, self._coordinates = scene, coordinates or {}
         self._readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
-        self._late: list[Reading] = []
+        self._late: list[tuple[Reading, Energies]] = []
         self._before: list[tuple[float, Scene]] = []
         self._lost = self._driven = 0.0
         self.times: list[float] = []
@@ -81,11 +81,10 @@ class Recorder(Remembering):
         self._driven += energies.driven
         work = energies.work + self._driven
         told = Energies(energies.kinetic, energies.elastic, work, self._lost, self._driven)
-        now = replace(now, energies=told)
-        self._late.append(now)
+        self._late.append((now, told))
         for output, readings in self._readings.items():
             if not output.late:
-                readings.append(output.read(now))
+                readings.append(output.read(replace(now, energies=told)))
         if len(self._late) == _MOST_LATE:
             self._read_late()
 
@@ -97,9 +96,11 @@ class Recorder(Remembering):
 
     def _read_late(self) -> None:
         """Let outputs read that can read many steps at once: as long as the ropes are the same."""
-        for _, own in itertools.groupby(self._late, lambda now: now.chain and id(now.chain.ropes)):
+        for _, own in itertools.groupby(
+            self._late, lambda one: id(getattr(one[0].chain, "ropes", 0))
+        ):
             steps = list(own)
-            whole = together(steps)
+            whole = together(*zip(*steps, strict=True))
             for output, readings in self._readings.items():
                 if output.late:
                     values = output.read(whole)
