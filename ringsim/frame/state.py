@@ -98,15 +98,6 @@ def add_forces(
     call("add_forces", mesh, pose, points, accelerations, strains, loads, g)
 
 
-def energies_of(mesh: Mesh, velocities: Array, strains: Array) -> tuple[float, float]:
-    """Kinetic energy of rods and points and elastic energy of rods, J; velocities of the points,
-    shape (p, 3), m/s.
-    """
-    found = np.zeros(2)
-    call("energies_of", mesh, velocities, strains, found)
-    return float(found[0]), float(found[1])
-
-
 # Generalised-alpha on points and angles: rates and accelerations follow from places.
 #
 # Of each coordinate z of a point, or angle, the integrator keeps the rate z', the acceleration a

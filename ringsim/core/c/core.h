@@ -247,6 +247,12 @@ typedef struct {
     I hub;
 } System;
 
+/* Number of a rope's cable, and whether the rope is at its beginning and at its end. */
+typedef struct {
+    I cable;
+    bool begins, ends;
+} Place;
+
 static inline Mat axes_of(const Pose *pose, I frame) { return matrix(pose->axes.at + 9 * frame); }
 
 static inline Vec place_of(const Pose *pose, I frame) { return vector(pose->place.at + 3 * frame); }
@@ -290,6 +296,7 @@ void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, con
                    I wide);
 D measure(const Ropes *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
           I n_rates, const Spans *spans);
+Place place_behind(const Ropes *ropes, I rope, Place before);
 D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g);
 I find_slopes(const Roped *roped, const Laws *laws);
 void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,
