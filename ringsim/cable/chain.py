@@ -1,15 +1,16 @@
-"""The state of the tension chain: what its ropes, pulleys and winches tell, and their work."""
+"""The state of the tension chain: what its ropes, pulleys and winches tell."""
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ringsim.cable.friction import LEAST_TENSION, Friction, Pulleys
-from ringsim.cable.ropes import Array, Flags, Ropes
+from ringsim.cable.ropes import PARTS, Array, Flags, Ropes
 from ringsim.cable.winding import WinchReading
 
-# The chain at one instant: tensions, forces, powers; and its work between two instants.
+# The chain at one instant: tensions, forces, powers.
 
 
 ROUNDED = 1e-12
@@ -17,59 +18,71 @@ ROUNDED = 1e-12
 begins as long as its path is off by 1e-15, as lengths of points in another order are summed."""
 
 
+class _Part:
+    """What one of ``PARTS`` is at an instant, shape (spans,), (pulleys,), (ropes,) or (cables, 2);
+    of many instants at once these are the first axis.
+    """
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name, self._each = name, PARTS[name][1]
+
+    def __get__(self, state: "ChainState", owner: type) -> Array:
+        found = state.numbers[..., state.ropes.places[self._name]]
+        return found if self._each == 1 else found.reshape(*found.shape[:-1], -1, self._each)
+
+
 @dataclass(frozen=True)
 class ChainState:
-    """All spans, pulleys and ropes at one instant; see ``ringsim.core.tension``."""
+    """All spans, pulleys and ropes at one instant, or at many; see ``ringsim.core.tension``."""
 
     ropes: Ropes
-    material: Array
-    """EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope, shape (3, ropes)."""
-    lengths: Array
-    rates: Array
-    """Length of each span (m) and its rate (m/s), shape (spans,)."""
-    directions: Array
-    """Unit vectors away from the winch, shape (spans, 3)."""
-    angles: Array
-    """Angle between the two pulls on each pulley (rad), shape (pulleys,)."""
-    log_decays: Array
-    """Logarithm of the full decay at each pulley, shape (pulleys,)."""
+    table: Any
+    """The same as the core takes it (``ringsim.core.tension.RopeTable``)."""
     friction: Friction
     """The laws of ``log_decays``, and their derivatives, which forces do not need."""
-    speeds: Array
-    """Rope over each pulley (m/s, towards the winch positive), shape (pulleys,)."""
-    exponents: Array
-    """Share and direction of the full decay, tanh(speed / slip speed), shape (pulleys,)."""
-    slip_speeds: Array
-    """Speed that regularises the exponents (m/s), shape (pulleys,)."""
-    shares: Array
-    """Tension of each span over its rope's mean tension, shape (spans,)."""
-    tensions: Array
-    """Of each span, in N, shape (spans,)."""
-    paths: Array
-    path_rates: Array
-    """Path length of each rope (m) and its rate (m/s), shape (ropes,)."""
-    natural: Array
-    wound_rates: Array
-    """Natural length of each rope (m) and what its winches take up (m/s), shape (ropes,)."""
-    strains: Array
-    strain_rates: Array
+    numbers: Array
+    """All that follows, in a row."""
+    lengths, rates = _Part(), _Part()
+    """Length of each span (m) and its rate (m/s)."""
+    directions = _Part()
+    """Unit vectors away from the winch, shape (spans, 3)."""
+    angles, log_decays = _Part(), _Part()
+    """Angle between the two pulls on each pulley (rad); logarithm of the full decay there."""
+    speeds = _Part()
+    """Rope over each pulley (m/s, towards the winch positive)."""
+    exponents = _Part()
+    """Share and direction of the full decay, tanh(speed / slip speed)."""
+    shares, tensions = _Part(), _Part()
+    """Tension of each span over its rope's mean tension, and in N."""
+    paths, path_rates = _Part(), _Part()
+    """Path length of each rope (m) and its rate (m/s)."""
+    natural, wound_rates = _Part(), _Part()
+    """Natural length of each rope (m) and what its winches take up (m/s)."""
+    strains, strain_rates = _Part(), _Part()
     """Mean strain of each rope, (path - natural) / natural as of paper 001's element, and its
-    rate in 1/s, shape (ropes,)."""
-    forces: Array
-    """Elastic and viscous force of each rope before smoothing (N), shape (ropes,)."""
-    mean_tensions: Array
-    """Mean tension of each rope, weighted by length (N), shape (ropes,)."""
-    viscous_forces: Array
-    """Viscous part of each rope's mean tension, in N, shape (ropes,)."""
-    energy_density: Array
-    """Elastic energy of each rope per natural length, in J/m, shape (ropes,)."""
-    friction_forces: Array
-    """Loss of tension over each pulley times the stretch there, in N, shape (pulleys,)."""
-    held_beyond: Array
-    """Natural length from each pulley to its rope's far end, m, shape (pulleys,)."""
-    wound: Array
-    wound_rate: Array
-    """Of the winches at both ends of each cable, m and m/s, shape (cables, 2)."""
+    rate in 1/s."""
+    forces = _Part()
+    """Elastic and viscous force of each rope before smoothing (N)."""
+    mean_tensions, viscous_forces = _Part(), _Part()
+    """Mean tension of each rope, weighted by length, and the viscous part of it (N)."""
+    energy_density = _Part()
+    """Elastic energy of each rope per natural length, in J/m."""
+    friction_forces = _Part()
+    """Loss of tension over each pulley times the stretch there, in N."""
+    held_beyond = _Part()
+    """Natural length from each pulley to its rope's far end, m."""
+    wound, wound_rate = _Part(), _Part()
+    """Of the winches at both ends of each cable, m and m/s."""
+
+    @property
+    def material(self) -> Array:
+        """EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope, shape (3, ropes)."""
+        return np.asarray(self.table.material.T)
+
+    @property
+    def slip_speeds(self) -> Array:
+        """Speed that regularises the exponents (m/s), shape (pulleys,)."""
+        return np.asarray(self.table.slip_speed)
 
     @property
     def exponent_slopes(self) -> Array:
@@ -95,8 +108,8 @@ class ChainState:
     @cached_property
     def winch_tensions(self) -> Array:
         """Tension at both ends of each cable, in N, shape (cables, 2)."""
-        edge = self.ropes.cable_starts
-        return np.array([self.tensions[edge[:-1]], self.tensions[edge[1:] - 1]]).T
+        edge, tensions = self.ropes.cable_starts, self.tensions
+        return np.stack([tensions[..., edge[:-1]], tensions[..., edge[1:] - 1]], axis=-1)
 
     @property
     def point_forces(self) -> Array:
@@ -165,30 +178,6 @@ class ChainState:
 
         path_rate = float(self.path_rates[rope] + self.wound_rates[rope]) - present
         return WinchReading(tension_ratio=ratio, path_rate=path_rate, path_slope=path_slope)
-
-
-def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
-    """Energies in J: put in by the winches, less what is wound up; lost by friction, damping.
-
-    The work of a force is its mean at both instants times the displacement: rope wound on a drum,
-    rope slipped over a pulley, strain of a rope.  Products of force and rate at the instants alone
-    would miss the displacement between them.  Nothing moves while a fault changes the ropes.
-    Source: the energy balance of Belytschko, Liu and Moran, Nonlinear Finite Elements for
-    Continua and Structures (2000), sec. 6.2.3.
-    """
-    ropes = after.ropes
-    if before.ropes is not ropes:
-        return 0.0, 0.0
-    wound = after.wound - before.wound
-    pulls = before.winch_forces + after.winch_forces
-    carried = before.energy_density + after.energy_density
-    slipped = before.held_beyond - after.held_beyond
-    slipped -= ropes.winds_beyond * wound[ropes.cable_of_pulley, 1]
-    rubbing = before.friction_forces + after.friction_forces
-    viscous = before.viscous_forces + after.viscous_forces
-    strained = 0.5 * (before.natural + after.natural) * (after.strains - before.strains)
-    driven = 0.5 * (np.vdot(pulls, wound) - carried @ ropes.per_rope(wound))
-    return float(driven), 0.5 * float(rubbing @ slipped + viscous @ strained)
 
 
 def pulley_tensions(ropes: Ropes, tensions: Array) -> Array:

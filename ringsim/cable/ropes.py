@@ -24,6 +24,18 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
+PARTS = {
+    "lengths": ("span", 1), "rates": ("span", 1), "tensions": ("span", 1), "shares": ("span", 1),
+    "directions": ("span", 3), "angles": ("pulley", 1), "speeds": ("pulley", 1),
+    "exponents": ("pulley", 1), "log_decays": ("pulley", 1), "friction_forces": ("pulley", 1),
+    "held_beyond": ("pulley", 1), "natural": ("rope", 1), "wound_rates": ("rope", 1),
+    "paths": ("rope", 1), "path_rates": ("rope", 1), "strains": ("rope", 1),
+    "strain_rates": ("rope", 1), "forces": ("rope", 1), "mean_tensions": ("rope", 1),
+    "viscous_forces": ("rope", 1), "energy_density": ("rope", 1), "wound": ("cable", 2),
+    "wound_rate": ("cable", 2),
+}  # fmt: skip
+"""What a chain tells (``ringsim.cable.chain.ChainState``), in the order in which the core puts it
+into a row: so many numbers for each span, pulley, rope or cable."""
 SHORTEST = 1e-9
 """Length in metre below which a span has no direction: rounding of coordinates, 1e-16 m, turns
 it by 1e-7 rad there."""
@@ -66,6 +78,15 @@ class Ropes:
         return int(self.cable_starts[-1])
 
     @cached_property
+    def places(self) -> dict[str, slice]:
+        """Where each of ``PARTS`` stands in the row of all."""
+        cables, ropes = len(self.points_per_cable), len(self.starts)
+        counts = {"span": self.spans, "pulley": len(self.behind), "rope": ropes, "cable": cables}
+        sizes = [counts[of] * each for of, each in PARTS.values()]
+        cuts = itertools.pairwise(itertools.accumulate(sizes, initial=0))
+        return {name: slice(*own) for name, own in zip(PARTS, cuts, strict=True)}
+
+    @cached_property
     def near(self) -> Indices:
         """Point at each span's end nearer to the winch, shape (spans,); the other: one more."""
         points = np.cumsum(self.points_per_cable)
@@ -90,16 +111,6 @@ class Ropes:
     def of_pulley(self) -> Indices:
         """Rope behind each pulley, shape (pulleys,)."""
         return self.of_span[self.behind]
-
-    @cached_property
-    def cable_of_pulley(self) -> Indices:
-        """Cable of each pulley, shape (pulleys,)."""
-        return self.cable[self.of_pulley]
-
-    @cached_property
-    def winds_beyond(self) -> Flags:
-        """Whether the rope behind each pulley ends at its cable's far end, shape (pulleys,)."""
-        return np.asarray(self.of_end[self.cable_of_pulley, 1] == self.of_pulley)
 
     @cached_property
     def slips(self) -> Array:

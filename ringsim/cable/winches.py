@@ -216,10 +216,9 @@ def root_of_rising(
 
 def driving(winches: Mapping[tuple[int, int], Winch], time: float, state: ChainState) -> bool:
     """Whether any winch, by cable and end, turns or will turn on a rope that is whole."""
-    whole = state.ropes.alive[state.ropes.of_end]
+    whole, rate = state.ropes.alive[state.ropes.of_end], state.wound_rate
     return any(
-        whole[place] and winch.drives(time, float(state.wound_rate[place]))
-        for place, winch in winches.items()
+        whole[place] and winch.drives(time, float(rate[place])) for place, winch in winches.items()
     )
 
 
@@ -280,7 +279,7 @@ class Winches:
 
     def _prescribed(self, time: float) -> tuple[Array, Array]:
         """As ``at``, while all that answer to their ropes stand still."""
-        wound, speed, begin = self._held.copy(), np.zeros_like(self._held), self._start
+        wound, speed, begin = self._held.copy(), np.zeros(self._held.shape), self._start
         inside = max(time - AT_ONCE, 0.5 * (begin + time))
         moment = inside if time > begin else time + AT_ONCE
         for place, winch in self._winches.items():

@@ -456,10 +456,10 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
     if cables.upper == cables.lower and not struck:
         yield "both planes are equal: each gives half of the drive"
         return
+    both = DriveMargin(scene, standard)
     for number, plane in enumerate(scene.structure.planes):
-        drive = PlaneMargin(scene, standard, number)
-        least = drive.least()
-        whole = drive.whole(least.angle).available
+        least = PlaneMargin(both, number).least()
+        whole = both.at(least.angle).available
         share = f"{100.0 * least.available / whole:.3g}" if whole > 0.0 else "0"
         yield (
             f"{plane} cable alone: gives {share} % of the drive and must overcome half of what "

@@ -21,7 +21,6 @@ from ringsim.core.tension import (
     Spans,
     factors_needed,
     measure,
-    of_ropes,
     slide,
     tension_changes,
     tighten,
@@ -114,7 +113,8 @@ class Chain:
             the friction.
         """
         table, spans = self._measured(ropes, points, velocities)
-        drums = self.drums(ropes, wound, wound_rate)
+        drums = Drums.still(len(ropes.starts))
+        drums.wind(table, _whole(wound), _whole(wound_rate))
         if not drums.natural.min() > 0.0:
             short = int(np.argmin(drums.natural))
             raise ValueError(
@@ -144,48 +144,15 @@ class Chain:
         every = np.arange(ropes.spans)
         return RopeTable.of(ropes, self.material, self.slip_speed, every if felt is None else felt)
 
-    def drums(self, ropes: Ropes, wound: Array, wound_rate: Array) -> Drums:
-        """Ropes whose winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
-        inflow = np.zeros(len(ropes.starts))
-        inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
-        return Drums(ropes.content - ropes.per_rope(wound), ropes.per_rope(wound_rate), inflow)
-
     def read(
         self, ropes: Ropes, table: RopeTable, drums: Drums, spans: Spans, log_decays: Array,
         wound: Array, wound_rate: Array,
     ) -> ChainState:  # fmt: skip
         """What the spans tell, whose tensions are known."""
-        told, at_pulleys = of_ropes(table, drums, spans, ropes.behind, log_decays)
-        paths, path_rates, strains, strain_rates, forces, means, viscous, density = told
-        return ChainState(
-            ropes=ropes,
-            material=self.material[:, ropes.cable],
-            lengths=spans.length.copy(),
-            rates=spans.rate.copy(),
-            directions=spans.unit.copy(),
-            angles=spans.angle.copy(),
-            log_decays=log_decays,
-            friction=self.friction,
-            speeds=spans.speed.copy(),
-            exponents=spans.exponent.copy(),
-            slip_speeds=self.slip_speed,
-            shares=spans.share.copy(),
-            tensions=spans.tension.copy(),
-            paths=paths,
-            path_rates=path_rates,
-            natural=drums.natural.copy(),
-            wound_rates=drums.winding.copy(),
-            strains=strains,
-            strain_rates=strain_rates,
-            forces=forces,
-            mean_tensions=means,
-            viscous_forces=viscous,
-            energy_density=density,
-            friction_forces=at_pulleys[0],
-            held_beyond=at_pulleys[1],
-            wound=wound,
-            wound_rate=wound_rate,
-        )
+        ends = _whole(wound), _whole(wound_rate)
+        numbers = np.empty(ropes.places["wound_rate"].stop)
+        call("read_chain", table, ropes.behind, drums, spans, log_decays, *ends, numbers)
+        return ChainState(ropes, table, self.friction, numbers)
 
     def changes(
         self, state: ChainState, velocities: Array, slopes: Array, left: Array, by_place: float,
@@ -213,7 +180,7 @@ class Chain:
         turning = np.zeros(len(ropes.starts), dtype=bool)
         turning[own[slips & (np.abs(slopes) * slip >= passing)]] = True
         slopes = np.where(turning[own], np.where(slopes == 0.0, _LEAST_SLOPE, slopes), 0.0)
-        table = self.table(ropes)
+        table = state.table
         spans = Spans(
             state.lengths, state.rates, state.directions, state.angles, state.tensions,
             state.shares, state.exponents, state.speeds,
@@ -247,6 +214,22 @@ class Chain:
 def _whole(numbers: Array) -> Array:
     """As the core takes them: laws may give whole numbers, and callers parts of arrays."""
     return np.ascontiguousarray(numbers, dtype=float)
+
+
+def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
+    """Energies in J: put in by the winches, less what is wound up; lost by friction, damping.
+
+    The work of a force is its mean at both instants times the displacement: rope wound on a drum,
+    rope slipped over a pulley, strain of a rope.  Products of force and rate at the instants alone
+    would miss the displacement between them.  Nothing moves while a fault changes the ropes.
+    Source: the energy balance of Belytschko, Liu and Moran, Nonlinear Finite Elements for
+    Continua and Structures (2000), sec. 6.2.3.
+    """
+    works = np.zeros(2)
+    if before.ropes is after.ropes:
+        rows = before.numbers, after.numbers
+        call("work_of_ropes", after.table, after.ropes.behind, *rows, works)
+    return float(works[0]), float(works[1])
 
 
 # What Newton's iterates of one step tell of dry friction (turning.c).

@@ -34,29 +34,32 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "play": ("t", _NONE),
     "place_points": ("tta", _NONE),
     "move": ("tta", _NONE),
-    "moved_between": ("ttta", _NONE),
+    "set_out": ("ttta", _NONE),
+    "arrive": ("ttta", _NONE),
     "straighten": ("t", _NONE),
     "energies_of": ("taaa", _NONE),
     "add_forces": ("ttaataa", _NONE),
     "begin_tangent": ("ttaaarrt", _NONE),
     "put_in_place": ("ttttata", _NONE),
-    "unbalance": ("ttwfrttt", _WHOLE),
-    "stiffen": ("ttwfrtt", _WHOLE),
+    "unbalance": ("ttwfrtt", _WHOLE),
+    "stiffen": ("ttwfrt", _WHOLE),
     "relax": ("tta", _NONE),
     "most_iterations": ("", _WHOLE),
     "learn": ("aaawa", _NONE),
-    "balance_step": ("ttwfrtttra", _WHOLE),
+    "balance_step": ("ttwfrttra", _WHOLE),
     "note_rates": ("ta", _NONE),
     "rates_across": ("ta", _NONE),
     "slopes_between": ("taaaaa", _NONE),
-    "read_energies": ("tttraaa", _NONE),
+    "read_energies": ("ttraaa", _NONE),
     "factor": ("tt", _TRUTH),
     "solve": ("tta", _NONE),
     "solve_one": ("tta", _NONE),
     "measure": ("tnaat", _REAL),
+    "wind": ("taat", _NONE),
     "slide": ("ttt", _NONE),
     "tighten": ("ttat", _NONE),
-    "of_ropes": ("tttnaaa", _NONE),
+    "read_chain": ("tnttaaaa", _NONE),
+    "work_of_ropes": ("tnaaa", _NONE),
     "pull_tight": ("tnttaat", _REAL),
     "factors_needed": ("ta", _WHOLE),
     "tension_changes": ("ttaaataarraa", _NONE),
@@ -148,26 +151,28 @@ def call(name: str, *given: Any) -> Any:
     words: list[Any] = []
     held = []  # until the function returns, whatever is forgotten meanwhile
     for letter, each in zip(takes, given, strict=True):
-        if letter in "an":
+        if letter == "t":
+            table = _known.get(id(each)) or _packed(each)
+            held.append(table)
+            words.append(table[2])
+        elif letter in "an":
             words += _address(each, letter), each.size
-        elif letter == "t":
-            held.append(_packed(each))
-            words.append(held[-1].address)
         else:
             words.append(each)
     return function(*words)
 
 
 def _address(array: Any, letter: str) -> int:
-    if array.size and not (
-        array.flags.c_contiguous and array.dtype.char == ("d" if letter == "a" else "l")
-    ):
+    if not array.size:  # of no other use than not to be NULL
+        return int(array.__array_interface__["data"][0])
+    if not (array.flags.c_contiguous and array.dtype.char == ("d" if letter == "a" else "l")):
         wanted = "real" if letter == "a" else "whole"
         raise TypeError(
             f"the core takes whole arrays of {wanted} numbers of 64 bits, not {array.dtype} "
             f"{array.shape} with strides {array.strides}"
         )
-    return int(array.__array_interface__["data"][0])
+    # numpy's own ways to tell it take several times as long.
+    return ctypes.addressof(ctypes.c_char.from_buffer(array))
 
 
 # Tables of a model are handed over thousands of times: each is packed once.  It stays while it is
@@ -186,12 +191,10 @@ _known: dict[int, _Packed] = {}
 
 
 def _packed(table: Any) -> _Packed:
-    found = _known.get(id(table))
-    if found is None:
-        if len(_known) >= MOST_KNOWN:
-            _known.clear()
-        words = np.array(_words(table), dtype=np.int64)
-        found = _known[id(table)] = _Packed(table, words, _address(words, "n"))
+    if len(_known) >= MOST_KNOWN:
+        _known.clear()
+    words = np.array(_words(table), dtype=np.int64)
+    found = _known[id(table)] = _Packed(table, words, _address(words, "n"))
     return found
 
 

@@ -53,8 +53,8 @@ from ringsim.core.library import call
 class RopeTable(NamedTuple):
     """What faults alone change: first span of each rope and one more than the last, first points of
     the spans, pulley before each span (-1: none, or jammed there), whether spans are felt, as they
-    are between different frames, and whether a rope is whole; EA (N),
-    Kelvin-Voigt time (s) and slack width (N) of each rope; slip speeds of the pulleys, m/s.
+    are between different frames; rope without what winches have wound (m), and whether it is whole;
+    EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope; slip speeds of the pulleys, m/s.
     """
 
     starts: Indices
@@ -62,6 +62,7 @@ class RopeTable(NamedTuple):
     near: Indices
     pulley: Indices
     felt: Indices
+    content: Array
     alive: Array
     material: Array
     slip_speed: Array
@@ -75,7 +76,8 @@ class RopeTable(NamedTuple):
         own = np.zeros(ropes.spans, dtype=np.int64)
         own[felt] = 1
         return cls(
-            ropes.starts, ropes.ends, ropes.near, pulley, own, ropes.alive.astype(float),
+            ropes.starts, ropes.ends, ropes.near, pulley, own, np.array(ropes.content, dtype=float),
+            ropes.alive.astype(float),
             material[:, ropes.cable].T.copy(), slip_speed,
         )  # fmt: skip
 
@@ -88,6 +90,15 @@ class Drums(NamedTuple):
     natural: Array
     winding: Array
     inflow: Array
+
+    @classmethod
+    def still(cls, ropes: int) -> "Drums":
+        """Of so many ropes, not yet wound."""
+        return cls(np.zeros(ropes), np.zeros(ropes), np.zeros(ropes))
+
+    def wind(self, table: RopeTable, wound: Array, rate: Array) -> None:
+        """Let the winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
+        call("wind", table, wound, rate, self)
 
 
 class Spans(NamedTuple):
@@ -128,19 +139,6 @@ def slide(table: RopeTable, drums: Drums, spans: Spans) -> None:
 def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> None:
     """Tensions of all spans, whose speeds are known."""
     call("tighten", table, drums, log_decays, spans)
-
-
-def of_ropes(
-    table: RopeTable, drums: Drums, spans: Spans, behind: Indices, log_decays: Array
-) -> tuple[Array, Array]:
-    """Of ropes whose spans are known, shape (8, ropes): paths and their rates, strains and theirs,
-    forces before slack, mean tensions and their viscous parts (N), and elastic energies per natural
-    length (J/m); of pulleys, shape (2, pulleys): tension lost times stretch (N), and natural length
-    up to the rope's far end (m).
-    """
-    out, pulleys = np.zeros((8, len(table.starts))), np.zeros((2, len(behind)))
-    call("of_ropes", table, drums, spans, behind, log_decays, out, pulleys)
-    return out, pulleys
 
 
 # Derivatives of the cable's forces after positions and velocities of its points.

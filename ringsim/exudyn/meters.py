@@ -7,7 +7,8 @@ from functools import cached_property
 import exudyn as exu
 import numpy as np
 
-from ringsim.cable.chain import ChainState, work_between
+from ringsim.cable.chain import ChainState
+from ringsim.core.chain import work_between
 from ringsim.exudyn.assembly import Array, Indices, axes_of, cross, spin
 from ringsim.exudyn.build import Built
 from ringsim.exudyn.cable_path import Direction

@@ -156,7 +156,7 @@ class Roped(NamedTuple):
         pulleys, spans, count = len(ropes.behind), ropes.spans, len(table.starts)
         most = factors_needed(table, np.ones(pulleys))
         return cls(
-            table, ropes.behind, Drums(*np.zeros((3, count))), Spans.empty(ropes),
+            table, ropes.behind, Drums.still(count), Spans.empty(ropes),
             Seen.empty(pulleys), np.zeros(pulleys), np.ones(count), np.zeros((most, spans)),
             np.zeros((most, spans, 3)), np.zeros((2, most, points, 3)),
             Border.empty(unknowns, most, hub),
@@ -293,10 +293,7 @@ class FrameCables:
 
     def _wind(self, wound: Array, rate: Array) -> None:
         """Let the winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
-        for own, found in zip(
-            self.roped.drums, self.chain.drums(self.ropes, wound, rate), strict=True
-        ):
-            own[:] = found
+        self.roped.drums.wind(self.roped.ropes, wound, rate)
         self._turned = _Turned(wound, rate)
 
     def _retable(self) -> None:

@@ -9,10 +9,11 @@ import numpy as np
 
 from ringsim.cable.chain import ChainState
 from ringsim.cable.ropes import CableFault, Ropes
+from ringsim.core.library import call
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter, Readings
-from ringsim.frame.state import State, Strains, move, moved_between, straighten
+from ringsim.frame.state import State
 from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Array
 from ringsim.outputs.meters import Reading
@@ -55,11 +56,11 @@ class NoBalanceError(Exception):
 class Integration(Run):
     """One run of a model."""
 
-    changing = ("_moves", "_taken", "_cubic", "_tried", "_steps", "_strains")
+    changing = ("_moves", "_taken", "_cubic", "_tried", "_steps")
     model: FrameModel
 
     def __init__(self, model: FrameModel, watch: Watch | None = None) -> None:
-        scene, elements = model.scene, len(model.mesh.length)
+        scene = model.scene
         super().__init__(scene, watch)
         self.model, self._cables = model, model.cables
         # Two states take turns: the core has seen their tables.
@@ -68,7 +69,6 @@ class Integration(Run):
         self._moves: list[tuple[float, Array]] = []
         self._taken, self._cubic, self._tried = [0, 0], True, 0
         self._steps: list[tuple[float, Array]] = []
-        self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._readings = Readings(model)
         self.history = Recorder(scene, self._readings.coordinates())
         ropes = None if model.cables is None else model.cables.ropes.content
@@ -124,30 +124,29 @@ class Integration(Run):
         """The state a step later."""
         time = self._control.now.time + step
         after = self._next
-        after.take(self._now)
-        self._move(after, self._guess(step))
-        self._strains = self._damped(step, after)
+        call("set_out", self.model.mesh, self._now.table, after.table, self._guess(step))
+        self._damp(step, after)
         self._newton(time, step, after)
         try:
             return after, self._measure(time, after)
         except ValueError as error:  # the winches have no answer
             raise NoBalanceError(str(error)) from error
 
-    def _damped(self, step: float, after: State) -> Strains:
-        """How the rates of strains follow from strains: the backward differences of second order
-        of ringsim.exudyn.assembly.
+    def _damp(self, step: float, after: State) -> None:
+        """Let rates of strains follow from strains: the backward differences of second order of
+        ringsim.exudyn.assembly.
         """
-        now = self._now.strains
-        if not self._steps:
-            return Strains(after.strains, -now / step, 1.0 / step)
-        last, before = self._steps[-1]
+        _, out, lead = after.strains
+        last, before = self._steps[-1] if self._steps else (math.inf, 0.0 * out)
         r = step / last
-        lead = (1.0 + 2.0 * r) / (step * (1.0 + r))
-        return Strains(after.strains, (r**2 / (1.0 + r) * before - (1.0 + r) * now) / step, lead)
+        lead[0] = (1.0 + 2.0 * r) / (step * (1.0 + r))
+        np.multiply(r**2 / (1.0 + r), before, out=out)
+        out -= (1.0 + r) * self._now.strains.now
+        out /= step
 
     def _newton(self, time: float, step: float, after: State) -> None:
         """Newton's method with secants, in place."""
-        found = self.model.balance(time, step, self._now, after, self._strains)
+        found = self.model.balance(time, step, self._now, after)
         self.history.newton_iterations += found.iterations
         self.history.jacobians += found.tangents
         self._choose(_MOST if found.why else found.iterations)
@@ -166,11 +165,6 @@ class Integration(Run):
         elif taken > _EASY and self._tried >= _PATIENCE:
             self._cubic, self._tried = not better, 0
 
-    def _move(self, state: State, by: Array) -> None:
-        move(self.model.mesh, state.pose, by[: self.model.mesh.unknowns])
-        if self.model.with_hub:
-            state.hub += by[-3:]
-
     def _guess(self, step: float) -> Array:
         """Change of all unknowns over a step, from the last two steps or three."""
         if not self._moves:
@@ -179,26 +173,18 @@ class Integration(Run):
 
     def _accept(self, step: float, after: State, found: Instant) -> None:
         """Go on from a state."""
-        before = self._now
-        moved = self._between(before, after) / step
+        before, moved = self._now, np.zeros(self.model.size)
+        call("arrive", self.model.mesh, before.table, after.table, moved)
+        moved /= step
         # Before rest it came as it leaves: the even motion through the first state.
         self._moves = [*(self._moves[-2:] or [(step, -moved)]), (step, moved)]
-        self._steps = [(step, before.strains.copy())]
-        straighten(after.pose)
+        self._steps = [(step, before.strains.now.copy())]
         self._now, self._next = after, before
         self._accepted(found)
 
-    def _between(self, before: State, after: State) -> Array:
-        """Changes of all unknowns."""
-        found = np.zeros(self.model.size)
-        moved_between(self.model.mesh, before.pose, after.pose, found)
-        if self.model.with_hub:
-            found[-3:] = after.hub - before.hub
-        return found
-
     def _reading(self, now: Instant) -> Reading:
         """See ``Run``."""
-        meters = self._readings.at(self._now, self._strains)
+        meters = self._readings.at(self._now)
         return meters.reading(now, self._at, self._cables)
 
     def _measured(self, time: float) -> Instant:
@@ -215,7 +201,7 @@ class Integration(Run):
     def _known(self, time: float, state: State) -> Instant:
         """A state whose chain is known."""
         angles, rates = self.model.openings.read(state.pose.angle, state.rate.angles)
-        energies, gap = self._energy.read(time, state, self._strains)
+        energies, gap = self._energy.read(time, state)
         return self._told(time, angles, rates, energies, gap, state.chain)
 
 

@@ -220,7 +220,6 @@ class JointLaws:
         layout, own, sense = skeleton.layout, *openings
         self.switches = Switches(layout.angle_laws)
         self.damping = np.zeros(len(skeleton.angles))
-        self._openings = openings
         self._friction: list[tuple[JointFriction, Indices, Array]] = []
         for rub in layout.rubs:
             self._rub(rub, skeleton)
@@ -258,11 +257,6 @@ class JointLaws:
         rows, last = self.acting.tape.rows, self.acting.soft
         rows[_ON, :last] = np.concatenate([np.zeros(0), *self.switches.on])
         rows[_SETTING, :last] = np.concatenate([np.zeros(0), *self.switches.setting])
-
-    def stop_torques(self, angles: Array, rates: Array) -> Array | None:
-        """Torques of the stop, (planes, sections), N m; None without."""
-        own, sense = self._openings
-        return self.switches.torques("stop", sense * angles[own], sense * rates[own])
 
 
 def _switched(law: AngleLaw) -> Law:

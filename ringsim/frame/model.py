@@ -230,26 +230,24 @@ class FrameModel:
             done += float(moved @ self.gravity)
         return done if self.hanging is None else done + self.hanging.work(state)
 
-    def tolerance(self, step: float, strains: Strains) -> float:
-        """Residual norm at which Newton stops in a step (s), N, of torques over ``lengths``; not
-        below what round-off leaves of coordinates: of inertia, of the rods with their damping, of
-        slides; of ropes, whose strain it is that is rounded.
+    def tolerance(self, step: float, lead: float = 0.0) -> float:
+        """Residual norm at which Newton stops in a step (s) with a ``lead`` of strains (1/s), N, of
+        torques over ``lengths``; not below what round-off leaves of coordinates: of inertia, of the
+        rods with their damping, of slides; of ropes, whose strain it is that is rounded.
         """
         inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
-        rods = self._stiffest * (1.0 + self._tau * strains.lead)
+        rods = self._stiffest * (1.0 + self._tau * lead)
         slides = STIFFNESS * self._stiffest * bool(self.skeleton.slides or self.bent)
         reached = 4.0 * sys.float_info.epsilon * (math.sqrt(self.size) * (inertia + rods) + slides)
         reached *= self._coordinates
         ropes = self._ropes.at(self.coefficients.rate_by_place(step))
         return max(self._tolerance, reached, 4.0 * sys.float_info.epsilon * ropes)
 
-    def balance(
-        self, time: float, step: float, start: State, now: State, strains: Strains
-    ) -> Balanced:
+    def balance(self, time: float, step: float, start: State, now: State) -> Balanced:
         """Bring a state into balance at a time (s), a step (s) after a start, in place."""
         told, places, rates = np.zeros(3), now.place.lines, now.rate.lines
-        tolerance, why = self.tolerance(step, strains), ""
-        given = start.table, now.table, strains, tolerance, told
+        tolerance, why = self.tolerance(step, float(now.strains.lead[0])), ""
+        given = start.table, now.table, tolerance, told
         try:
             how = self.core("balance_step", time, step, now, *given)
             if how == _NO_TENSIONS and self.cables is not None:
@@ -257,6 +255,8 @@ class FrameModel:
         except ValueError as error:  # the winches or the ropes have no answer
             how, why = _NO_TENSIONS, str(error)
         iterations, tangents, norm = int(told[0]), int(told[1]), float(told[2])
+        if how == _BALANCED:
+            return Balanced(iterations, tangents, "")
         words = {
             _UNBALANCED: f"Newton's residual is {norm:.3g} N after {iterations} iterations, "
             f"step {step:.3g} s",
@@ -322,16 +322,15 @@ class FrameModel:
         hub = np.zeros(3) if self.layout.hub is None else np.array(self.layout.hub.place)
         self._hub = hub.copy()
         state = State(
-            pose, hub, np.zeros((len(self.mesh.length), 6)),
+            pose, hub, Strains.resting(len(self.mesh.length)),
             Followed.at_rest(np.zeros(self._held.cuts[-1]), np.zeros(self._held.cuts[-1])),
             self._held,
         )  # fmt: skip
         self._place(state)
         if any(rod.nodes for rod in self.layout.rods):
-            held = Strains(state.strains, np.zeros_like(state.strains), 0.0)
             points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
             still = np.zeros_like(points)
-            add_forces(self.mesh, pose, points, still, held, self._kept, unloaded)
+            add_forces(self.mesh, pose, points, still, state.strains, self._kept, unloaded)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)

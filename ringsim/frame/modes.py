@@ -17,7 +17,7 @@ from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import Readings
 from ringsim.frame.springs import STIFFNESS
-from ringsim.frame.state import Coefficients, State, Strains, add_forces, move
+from ringsim.frame.state import Coefficients, State, add_forces, move
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.points import points_of
 from ringsim.parts.laws import AngleLaw, AngleRecord, Reaction, two_sided
@@ -170,8 +170,6 @@ class Standing:
         for each in self.state.followed[1:]:
             each[:] = 0.0
         self._still = self.state.copy()
-        empty = np.zeros_like(self.state.strains)
-        self._strains = Strains(self.state.strains, empty, 0.0)
         stiffness = _HOLDS if scene.stop is None else scene.stop.stiffness
         self._hold(stiffness, math.radians(opening - start), ramps=not latched)
         self._shift = _SHIFT
@@ -215,7 +213,7 @@ class Standing:
 
     def unbalance(self) -> Array:
         """Forces out of balance, N and N m."""
-        given = self._still.table, self.state.table, self._strains
+        given = self._still.table, self.state.table
         # A step so long that what has moved has no acceleration.
         self.model.core("unbalance", 0.0, _STILL, self.state, *given)
         return self.model.system.g
@@ -223,8 +221,7 @@ class Standing:
     def _factor(self) -> None:
         """Factor K + s M, s as small as pivots allow."""
         self.unbalance()
-        while self.model.core("stiffen", 0.0, self._step, self.state, self.state.table,
-                              self._strains):  # fmt: skip
+        while self.model.core("stiffen", 0.0, self._step, self.state, self.state.table):
             self._shift *= _MORE
             if self._shift > _LARGEST_SHIFT:
                 raise InputError(
@@ -237,7 +234,7 @@ class Standing:
         model = self.model
         for taken in range(_PATIENCE):
             norm = float(np.linalg.norm(self.unbalance() / model.lengths))
-            if norm <= model.tolerance(1.0, self._strains):
+            if norm <= model.tolerance(1.0):
                 return
             try:
                 self._factor()
@@ -443,7 +440,7 @@ class Standing:
         for square, vector in zip(squares, vectors.T, strict=True):
             state.rate.points[...] = (self.moving @ vector).reshape(-1, 3)
             state.rate.hub[...] = vector[-3:] if model.with_hub else 0.0
-            shapes.append(readings.at(state, self._strains).points()[:, 1])
+            shapes.append(readings.at(state).points()[:, 1])
             stored = self.stored(vector)
             shares.append([*stored, 0.5 * square - sum(stored)] / (0.5 * abs(square)))
         moved, places = np.array(shapes), readings.points()[:, 0]
@@ -478,10 +475,9 @@ class Standing:
         model, mesh = self.model, self.model.mesh
         call("place_points", mesh, state.pose, state.place.points)
         room, still = np.zeros_like(model.system.kept), np.zeros_like(state.place.points)
-        held = Strains(state.strains, np.zeros_like(state.strains), 0.0)
         g = np.zeros(mesh.unknowns)
-        add_forces(mesh, state.pose, state.place.points, still, held, room, g)
-        return state.strains
+        add_forces(mesh, state.pose, state.place.points, still, state.strains, room, g)
+        return state.strains.now
 
     def _in_joints(self, turned: Array) -> float:
         """Energy in V-joints that turn by so much, (planes, sections), rad."""

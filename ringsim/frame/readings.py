@@ -6,11 +6,12 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from ringsim.cable.chain import ChainState, work_between
+from ringsim.cable.chain import ChainState
+from ringsim.core.chain import work_between
 from ringsim.core.library import call
 from ringsim.frame.mesh import Indices, Mesh
 from ringsim.frame.model import FrameModel
-from ringsim.frame.state import State, Strains
+from ringsim.frame.state import State
 from ringsim.layout.bodies import Array, OnBody, OnRod
 from ringsim.layout.points import BOOM_TIP, HUB, Where, points_of
 from ringsim.outputs.meters import Bodies, Meters, Places
@@ -34,7 +35,6 @@ class Readings(Meters):
     """
 
     _state: State
-    _strains: Strains
 
     def __init__(self, model: FrameModel) -> None:
         super().__init__(model.scene, model.layout)
@@ -48,9 +48,9 @@ class Readings(Meters):
         if model.scene.record.positions:
             _ = self._of_points  # likewise
 
-    def at(self, state: State, strains: Strains) -> Self:
-        """Measure this state, with its strains, from now on."""
-        self._state, self._strains = state, strains
+    def at(self, state: State) -> Self:
+        """Measure this state from now on."""
+        self._state = state
         return self
 
     @property
@@ -82,7 +82,7 @@ class Readings(Meters):
 
     def section_forces(self, places: Places, *, damped: bool) -> tuple[Array, Array]:
         """From the strains of elements."""
-        own, mesh, strains = self._elements(places), self._mesh, self._strains
+        own, mesh, strains = self._elements(places), self._mesh, self._state.strains
         now, before = strains.now[own], strains.before[own]
         felt = now
         if damped:
@@ -92,7 +92,7 @@ class Readings(Meters):
 
     def rod_energy(self) -> float:
         """From the strains."""
-        strains = self._state.strains[: len(self._stiffness)]
+        strains = self._state.strains.now[: len(self._stiffness)]
         return 0.5 * float(np.sum(self._stiffness * strains**2))
 
     def reaction(self) -> Array | None:
@@ -213,8 +213,8 @@ class EnergyMeter(Remembering):
         self._last = self._kept = Passed(np.zeros((3, 0)), 0.0, None)
         self._done = self.strained = 0.0
 
-    def read(self, time: float, state: State, strains: Strains) -> tuple[Energies, float]:
-        """Energies of a state at a time (s) with its strains and, if there are cables, its chain;
+    def read(self, time: float, state: State) -> tuple[Energies, float]:
+        """Energies of a state at a time (s) with, if there are cables, its chain;
         and the largest gap of a joint, m.
 
         Losses and what winches put in count from the state that was kept last.
@@ -228,8 +228,7 @@ class EnergyMeter(Remembering):
             own[:, : self._hung] = each
         told = np.zeros(len(Measured._fields))
         call(
-            "read_energies", model.system, state.table, strains, time - kept.time, own, kept.rows,
-            told,
+            "read_energies", model.system, state.table, time - kept.time, own, kept.rows, told,
         )  # fmt: skip
         kinetic, elastic, strained, lost, gap = told.tolist()
         driven = 0.0

@@ -59,27 +59,22 @@ class Pose(NamedTuple):
 
 class Strains(NamedTuple):
     """Strains u (m) and psi (rad) of all elements at a state, shape (e, 6); ``before`` and
-    ``lead`` (1/s) give their rates, lead * strain + before.
+    ``lead`` (1/s, shape (1,)) give their rates, lead * strain + before.
     """
 
     now: Array
     before: Array
-    lead: float
+    lead: Array
+
+    @classmethod
+    def resting(cls, elements: int) -> "Strains":
+        """None, of so many elements."""
+        return cls(np.zeros((elements, 6)), np.zeros((elements, 6)), np.zeros(1))
 
 
 def move(mesh: Mesh, pose: Pose, step: Array) -> None:
     """Move a pose by changes of all unknowns, shape (unknowns,); in place."""
     call("move", mesh, pose, step)
-
-
-def moved_between(mesh: Mesh, before: Pose, after: Pose, out: Array) -> None:
-    """Changes of all unknowns from one pose to another, shape (unknowns,)."""
-    call("moved_between", mesh, before, after, out)
-
-
-def straighten(pose: Pose) -> None:
-    """Take what round-off has done to the axes out: R (3 - R^T R) / 2."""
-    call("straighten", pose)
 
 
 def place_points(mesh: Mesh, pose: Pose, out: Array) -> None:
@@ -101,15 +96,6 @@ def add_forces(
     points, (p, 3).
     """
     call("add_forces", mesh, pose, points, accelerations, strains, loads, g)
-
-
-def energies_of(mesh: Mesh, velocities: Array, strains: Array) -> tuple[float, float]:
-    """Kinetic energy of rods and points and elastic energy of rods, J; velocities of the points,
-    shape (p, 3), m/s.
-    """
-    found = np.zeros(2)
-    call("energies_of", mesh, velocities, strains, found)
-    return float(found[0]), float(found[1])
 
 
 # Generalised-alpha on points and angles: rates and accelerations follow from places.
@@ -223,6 +209,7 @@ class Moving(NamedTuple):
     pose: Pose
     hub: Array
     followed: Followed
+    strains: Strains
 
 
 class State:
@@ -231,10 +218,10 @@ class State:
     """
 
     def __init__(
-        self, pose: Pose, hub: Array, strains: Array, followed: Followed, held: Held
+        self, pose: Pose, hub: Array, strains: Strains, followed: Followed, held: Held
     ) -> None:
         self.pose, self.hub, self.strains, self.followed = pose, hub, strains, followed
-        self.table = Moving(pose, hub, followed)
+        self.table = Moving(pose, hub, followed, strains)
         self._held = held
         self.place = Groups.of(followed.place, held)
         self.rate = Groups.of(followed.rate, held)
@@ -254,19 +241,14 @@ class State:
         for own, value in zip(self._arrays(), memory["arrays"], strict=True):
             own[...] = value
 
-    def take(self, other: "State") -> None:
-        """Be where another state is."""
-        for own, value in zip(self._arrays(), other._arrays(), strict=True):
-            np.copyto(own, value)
-
     def _arrays(self) -> list[Array]:
-        return [*self.pose, self.hub, self.strains, *self.followed]
+        return [*self.pose, self.hub, *self.strains, *self.followed]
 
     def copy(self) -> "State":
         """Arrays of its own."""
         pose, hub = Pose(*(each.copy() for each in self.pose)), self.hub.copy()
-        strains, followed = self.strains.copy(), self.followed.copy()
-        return State(pose, hub, strains, followed, self._held)
+        strains = Strains(*(each.copy() for each in self.strains))
+        return State(pose, hub, strains, self.followed.copy(), self._held)
 
 
 # Lines that carry corners, on their followed places.

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -154,6 +155,7 @@ class Layout:
             found[group] = found.get(group, 0.0) + mass
         return found
 
+    @cached_property
     def point_masses(self) -> PointMasses:
         """Point masses that move as the rigid parts do, with the same inertia.
 

@@ -29,6 +29,7 @@ from ringsim.variables import TIMINGS, Cause, Fate, Outcome, Status
 class EnergyBalance(Output):
     """Kinetic and elastic energy, work of loads and winches, what was lost, and the imbalance."""
 
+    late = True
     rank = 60
     of_antenna = False
     variables = (
@@ -47,7 +48,7 @@ class EnergyBalance(Output):
 
     def read(self, now: Reading) -> Array:
         """In the order of the variables, and what winches have put in, J, shape (5,)."""
-        return np.array(now.energies)
+        return np.stack(now.energies, axis=-1)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Each interpolated by itself: the losses may be unknown (NaN) where the others are not."""

@@ -19,7 +19,6 @@ from ringsim.outputs.family import (
     Variable,
 )
 from ringsim.parts.solver import LEAST_TOLERANCE, NO_DEVIATIONS
-from ringsim.stepping.locks import history
 
 # What the base carries, and how it turns.
 
@@ -186,7 +185,7 @@ def jerked(run: Run) -> str:
     ahead = (first[..., None, None] == first) & (
         locks[..., None, None] - locks > 0.25 * slowest_period(run)
     )
-    met = history(run.scene, run.angles.times, run.angles.values, run.rates.values).rates
+    met = run.history.rates
     asked = np.broadcast_to(np.asarray(latch.min_rate, dtype=float), locks.shape)
     near = (met < _DOUBTFUL * asked) & (asked < _DOUBTFUL * met)
     late = np.argwhere(ahead.any(axis=(-2, -1)) & near).tolist()

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -16,7 +17,7 @@ from ringsim.outputs.meters import Reading
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Array
-from ringsim.stepping.locks import history
+from ringsim.stepping.locks import History, history
 from ringsim.variables import ErrorBar, Variable
 
 # Readings over time, and a run that has ended.
@@ -103,15 +104,19 @@ class Run:
             for (begin, end), scene in zip(bounds, scenes, strict=True)
         ]
 
-    @property
+    @cached_property
+    def history(self) -> History:
+        """What became of the latches."""
+        return history(self.scene, self.angles.times, self.angles.values, self.rates.values)
+
+    @cached_property
     def held(self) -> Array:
         """When each V-joint locked, shape (planes, sections), s: when its latch caught, or, without
         latches, when it reached 180 deg; NaN if it did not.
         """
         if self.scene.stop is None or not self.scene.stop.latch:
             return self.locks
-        series = self.angles.times, self.angles.values, self.rates.values
-        caught_at = history(self.scene, *series).caught_at
+        caught_at = self.history.caught_at
         if self.caught is None:
             return caught_at
         # A run that went on may have had other latches before.
@@ -299,6 +304,9 @@ class Output:
     """Field of ``ringsim.parts.solver.Limits`` that its largest reading must not pass."""
     of_antenna: ClassVar[bool] = True
     """Whether it tells of the antenna, so that engines are compared by it, not of the run."""
+    late: ClassVar[bool] = False
+    """Whether it reads many instants at once, which stand along the first axis, behind them; as
+    those do that read nothing."""
     rank: ClassVar[int] = 50
     """Place among the outputs in files and summaries; the smaller the earlier."""
 
@@ -307,6 +315,8 @@ class Output:
         twice = sorted(_declared(cls).keys() & (VARIABLES.keys() | COORDINATES.keys()))
         if twice:
             raise ValueError(f"{cls.__module__}: there is an output {twice[0]} already: rename it")
+        own = vars(cls)  # what reads in its own way says itself whether it does so late
+        cls.late = own.get("late", "read" not in own and (cls.late or cls.read is Output.read))
         COORDINATES.update({variable.name: variable for variable in cls.coordinates})
         OUTPUTS.append(cls)
         OUTPUTS.sort(key=lambda output: output.rank)
@@ -316,7 +326,7 @@ class Output:
 
     def read(self, now: Reading) -> Array | float | None:
         """What to keep of the state after an accepted step; None if this run does not tell it."""
-        return np.empty(0)
+        return np.empty((*np.shape(now.time), 0))
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Values of its variables, from what ``read`` gave at all instants of a run.

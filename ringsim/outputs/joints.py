@@ -20,7 +20,6 @@ from ringsim.outputs.family import (
     ties,
     with_ties,
 )
-from ringsim.stepping.locks import history
 
 # The opening angles of all V-joints.
 
@@ -222,7 +221,7 @@ class Latching(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """From the steps, as the engines do while they run."""
-        rates = _rates(run)
+        rates = run.history.rates
         caught = np.isfinite(run.held).astype(np.int32)
         return {
             "latch_rate": rates,
@@ -235,7 +234,7 @@ class Latching(Output):
 
     def shocks(self, run: Run, series: Series) -> dict[str, float]:
         """When the joint met its latch that was the slowest."""
-        rates = _rates(run)
+        rates = run.history.rates
         return _at_lock("least_latch_rate", run, -rates) if np.isfinite(rates).all() else {}
 
 
@@ -259,14 +258,14 @@ class FastestLatch(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of the joints that came to their latches, also where others did not."""
-        rates = _rates(run)
+        rates = run.history.rates
         return {"peak_latch_rate": np.fmax.reduce(rates, axis=None)} | LARGEST.at(
             run, run.locks, rates
         )
 
     def shocks(self, run: Run, series: Series) -> dict[str, float]:
         """When the joint met its latch that was the fastest."""
-        return _at_lock("peak_latch_rate", run, _rates(run))
+        return _at_lock("peak_latch_rate", run, run.history.rates)
 
 
 def _at_lock(name: str, run: Run, values: Array) -> dict[str, float]:
@@ -274,11 +273,6 @@ def _at_lock(name: str, run: Run, values: Array) -> dict[str, float]:
     if not np.isfinite(values).any():
         return {}
     return {name: float(run.locks.flat[int(np.nanargmax(values))])}
-
-
-def _rates(run: Run) -> Array:
-    """Shape (planes, sections), rad/s; NaN where a joint did not come to its latch."""
-    return history(run.scene, run.angles.times, run.angles.values, run.rates.values).rates
 
 
 def missed(values: Values, planes: Sequence[str]) -> str:
@@ -394,6 +388,7 @@ def _rest(times: Array, rates: Array, begun: int, lock: float) -> float:
 class JointGaps(Output):
     """Largest distance of points that a joint should hold together."""
 
+    late = True
     rank = 61
     of_antenna = False
     variables = (

@@ -1,7 +1,7 @@
 """What outputs read of a state: one instant of a run, and what an engine tells of it when asked."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from ringsim.layout.points import points_of
 from ringsim.parts.laws import Switches
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
-from ringsim.stepping.instant import Array, Instant
+from ringsim.stepping.instant import Array, Energies, Instant
 
 Places = tuple[tuple[int, int], ...]
 """Elements of rods, each told by its rod and its place in the rod."""
@@ -189,12 +189,15 @@ class Reading(Instant):
     """Speeds that winches are told, m/s, shape (cables, 2), NaN of those that take no commands;
     None without cables."""
 
-    def by_plane(self, of_cables: NDArray[Any]) -> Array:
-        """A number for each plane, from one for each cable; NaN where a plane has no cable."""
-        found = np.full(len(self.angles), np.nan)
-        for planes, value in zip(self.planes, of_cables, strict=True):
+    def by_plane(self, of_cables: NDArray[Any], behind: int = 0) -> Array:
+        """Numbers for each plane, from those of each cable, an axis with so many behind it; NaN
+        where a plane has no cable.
+        """
+        own = np.moveaxis(of_cables, -1 - behind, 0)
+        found = np.full((self.angles.shape[-2], *own.shape[1:]), np.nan)
+        for planes, value in zip(self.planes, own, strict=True):
             found[list(planes)] = value
-        return found
+        return np.moveaxis(found, 0, -1 - behind)
 
     def by_place(self, of_cables: Array, edges: Sequence[int]) -> Array:
         """Values for each plane, shape (..., planes, places), from those of all cables behind one
@@ -202,7 +205,7 @@ class Reading(Instant):
         or one of fewer places.
         """
         most = max(b - a for a, b in pairwise(edges))
-        found = np.full((*of_cables.shape[:-1], len(self.angles), most), np.nan)
+        found = np.full((*of_cables.shape[:-1], self.angles.shape[-2], most), np.nan)
         for planes, (first, last) in zip(self.planes, pairwise(edges), strict=True):
             for plane in planes:
                 found[..., plane, : last - first] = of_cables[..., first:last]
@@ -211,3 +214,18 @@ class Reading(Instant):
     def stop_torques(self) -> Array | None:
         """Torque of the stop on every V-joint, shape (planes, sections), N m; None without."""
         return self.meters.switches.torques("stop", np.pi - self.angles, -self.rates)
+
+
+def together(steps: Sequence[Reading], energies: Sequence[Energies]) -> Reading:
+    """What was read at many instants with the same ropes, with energies since the start, as one
+    reading: what changes stands along the first axis; ``meters`` look at another state by now.
+    """
+    first, changed = steps[0], dict[str, Any]()
+    for name in ("time", "angles", "rates", "gap", "commands"):
+        if getattr(first, name) is not None:
+            changed[name] = np.array([getattr(one, name) for one in steps])
+    changed["energies"] = Energies(*np.array(energies).T)
+    if first.chain is not None:
+        numbers = np.array([one.chain.numbers for one in steps if one.chain is not None])
+        changed["chain"] = replace(first.chain, numbers=numbers)
+    return replace(first, **changed)

@@ -38,6 +38,7 @@ class Motors(Output):
     A motor that is switched off, or whose winch stops when its plane has locked, gives nothing.
     """
 
+    late = True
     rank = 45
     needs = ("motors",)
     electrical: ClassVar = tuple(
@@ -94,13 +95,9 @@ class Motors(Output):
         """
         if now.chain is None or now.commands is None:
             return None
-        found = np.full((len(now.angles), 2, 4), np.nan)
         chain = now.chain
         each = chain.winch_tensions, chain.wound_rate, chain.wound, now.commands
-        own = np.stack(each, axis=-1)
-        for planes, value in zip(now.planes, own, strict=True):
-            found[list(planes)] = value
-        return found
+        return now.by_plane(np.stack(each, axis=-1), 2)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of the tensions and speeds at the steps; energies are sums of mean torque times turn."""
@@ -153,6 +150,7 @@ class Motors(Output):
 class Commands(Output):
     """What a controller tells the winches."""
 
+    late = True
     rank = 44
     needs = ("controller",)
     variables = (
@@ -164,12 +162,7 @@ class Commands(Output):
 
     def read(self, now: Reading) -> Array | None:
         """For every plane and end."""
-        if now.commands is None:
-            return None
-        found = np.full((len(now.angles), 2), np.nan)
-        for planes, value in zip(now.planes, now.commands, strict=True):
-            found[list(planes)] = value
-        return found
+        return None if now.commands is None else now.by_plane(now.commands, 1)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """As it stands at the output times."""

@@ -1,8 +1,10 @@
 """Recording a run step by step, reducing it to its outcome, and storing its states."""
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,7 @@ from ringsim.outputs.family import (
     output_times,
 )
 from ringsim.outputs.joints import missed
+from ringsim.outputs.meters import together
 from ringsim.outputs.rods_and_cables import slackened
 from ringsim.parts.faults import AT_ONCE, Fault
 from ringsim.refusal import InputError, show
@@ -35,6 +38,10 @@ from ringsim.tables import with_unit
 from ringsim.variables import Fate, Outcome, Reason, Status
 
 # Recording a run step by step, and reducing it to its outcome at the end.
+
+
+_MOST_LATE = 256
+"""Steps that are read at once at most: what is kept of each is as much as what outputs keep."""
 
 
 class Recorder(Remembering):
@@ -49,7 +56,8 @@ class Recorder(Remembering):
     def __init__(self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None) -> None:
         """Begin a run; ``coordinates`` are those that its outputs declare themselves."""
         self._scene, self._coordinates = scene, coordinates or {}
-        self.readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
+        self._readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
+        self._late: list[tuple[Reading, Energies]] = []
         self._before: list[tuple[float, Scene]] = []
         self._lost = self._driven = 0.0
         self.times: list[float] = []
@@ -73,9 +81,31 @@ class Recorder(Remembering):
         self._driven += energies.driven
         work = energies.work + self._driven
         told = Energies(energies.kinetic, energies.elastic, work, self._lost, self._driven)
-        now = replace(now, energies=told)
-        for output, readings in self.readings.items():
-            readings.append(output.read(now))
+        self._late.append((now, told))
+        for output, readings in self._readings.items():
+            if not output.late:
+                readings.append(output.read(replace(now, energies=told)))
+        if len(self._late) == _MOST_LATE:
+            self._read_late()
+
+    @property
+    def readings(self) -> dict[Output, list[Any]]:
+        """What outputs have read of all steps."""
+        self._read_late()
+        return self._readings
+
+    def _read_late(self) -> None:
+        """Let outputs read that can read many steps at once: as long as the ropes are the same."""
+        for _, own in itertools.groupby(
+            self._late, lambda one: id(getattr(one[0].chain, "ropes", 0))
+        ):
+            steps = list(own)
+            whole = together(*zip(*steps, strict=True))
+            for output, readings in self._readings.items():
+                if output.late:
+                    values = output.read(whole)
+                    readings += [None] * len(steps) if values is None else list(np.asarray(values))
+        self._late.clear()
 
     def forget_last(self) -> None:
         """Take the last step out, to note it anew."""
@@ -126,7 +156,7 @@ class Recorder(Remembering):
             readings[:] = [None] * steps if past is None else list(past[:steps])
         for name, own in self._lists().items():
             values = history[name][:steps]
-            own[:] = values.tolist() if values.ndim == 1 else list(values)
+            own[:] = values.tolist() if values.ndim == 1 else list(np.asarray(values))
         self.energies[:] = [Energies(*row.tolist()) for row in history["energies"][:steps]]
         # What a scene was made of decides about readings that were made with it, ever after.
         self._before = list(before)
@@ -152,6 +182,7 @@ class Recorder(Remembering):
             lock_times(times, angles, rates), counts, known, tuple(self._before), self.caught,
         )  # fmt: skip
 
+        @cache
         def series_of(output: Output) -> Series | None:
             readings = self.readings[output]
             unknown = any(reading is None for reading in readings)
@@ -256,7 +287,7 @@ def spanned(values: Iterable[str], known: Mapping[str, NDArray[Any]]) -> dict[st
 # States stored on the way of a run, and going on from one.
 
 
-FORMAT = 5
+FORMAT = 6
 """Of what is stored; a state of another format is refused."""
 
 

@@ -34,6 +34,7 @@ class CableTension(Output):
     at a ring that is not locked, and that counts.
     """
 
+    late = True
     rank = 40
     needs = ("cables",)
     peak = TENSION_PEAK
@@ -107,6 +108,7 @@ class NetTension(Output):
 class SlackDuration(Output):
     """Time for which each cable was slack at its first winch."""
 
+    late = True
     rank = 41
     needs = ("cables",)
     variables = (
@@ -120,8 +122,9 @@ class SlackDuration(Output):
 
     def read(self, now: Reading) -> Array | None:
         """1 where the rope at the first winch is slack, else 0, shape (planes,)."""
-        chain = now.chain
-        return None if chain is None else now.by_plane(chain.is_slack[chain.ropes.of_end[:, 0]])
+        if (chain := now.chain) is None:
+            return None
+        return now.by_plane(chain.is_slack[..., chain.ropes.of_end[:, 0]])
 
     def reduce(self, run: Run, series: Series) -> Values:
         """The sum of the steps, of which those that begin or end taut count half."""
@@ -145,6 +148,7 @@ class LongestSlack(Output):
     until the span's plane has locked, and no longer once the rope has parted.
     """
 
+    late = True
     rank = 41
     needs = ("cables",)
     peak = PEAK_OF_SLACK
@@ -165,7 +169,7 @@ class LongestSlack(Output):
         if chain is None:
             return None
         ropes = chain.ropes
-        free = chain.lengths * ((chain.natural - chain.paths) / chain.paths)[ropes.of_span]
+        free = chain.lengths * ((chain.natural - chain.paths) / chain.paths)[..., ropes.of_span]
         if not ropes.alive.all():
             free = np.where(ropes.alive[ropes.of_span], free, -math.inf)
         return now.by_place(free, ropes.edges)
@@ -240,6 +244,7 @@ class PulleyRatio(Output):
     tensions.
     """
 
+    late = True
     rank = 40
     needs = ("cables",)
     variables = (
@@ -259,14 +264,15 @@ class PulleyRatio(Output):
         if chain is None:
             return None
         ropes = chain.ropes
-        taut = ~chain.is_slack[ropes.of_span[ropes.behind - 1]]
+        taut = ~chain.is_slack[..., ropes.of_span[ropes.behind - 1]]
         ratios = np.exp(chain.exponents * chain.log_decays)
         jammed = ropes.slips == 0.0
         if jammed.any():
-            before, behind = chain.tensions[ropes.behind - 1], chain.tensions[ropes.behind]
+            tensions = chain.tensions
+            before, behind = tensions[..., ropes.behind - 1], tensions[..., ropes.behind]
             met = np.divide(behind, before, out=np.ones_like(before), where=taut)
             ratios = np.where(jammed, met, ratios)
-        return now.by_place(np.array([ratios, taut]), ropes.pulley_edges)
+        return now.by_place(np.stack([ratios, taut], axis=-2), ropes.pulley_edges)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated; missing where the nearer step found the rope slack."""
@@ -280,6 +286,7 @@ class PulleyRatio(Output):
 class RopeStrain(Output):
     """(S - M) / M with the length S of the path and the natural length M of the rope on it."""
 
+    late = True
     rank = 42
     needs = ("cables",)
     variables = (
@@ -292,7 +299,7 @@ class RopeStrain(Output):
     def read(self, now: Reading) -> Array | None:
         """Shape (planes,); NaN where a plane has no cable."""
         chain = now.chain
-        return None if chain is None else now.by_plane(chain.strains[chain.ropes.of_end[:, 0]])
+        return None if chain is None else now.by_plane(chain.strains[..., chain.ropes.of_end[:, 0]])
 
 
 # Length of the driving cable of a structure with a gauge.
@@ -301,13 +308,14 @@ class RopeStrain(Output):
 class CableLength(Output):
     """Distance from the lower joint on the axis to the upper outer joint: the last span."""
 
+    late = True
     rank = 43
     needs = ("gauge",)
     variables = (Variable("cable_length", ("plane", "time"), "m", "length of the driving cable"),)
 
     def read(self, now: Reading) -> Array | None:
         """Shape (1,), m."""
-        return None if now.chain is None else now.chain.lengths[-1:]
+        return None if now.chain is None else now.chain.lengths[..., -1:]
 
 
 # Rope that the winches have wound up.
@@ -316,6 +324,7 @@ class CableLength(Output):
 class WoundLength(Output):
     """Rope wound by all winches of each cable."""
 
+    late = True
     rank = 42
     needs = ("cables",)
     variables = (
@@ -324,7 +333,7 @@ class WoundLength(Output):
 
     def read(self, now: Reading) -> Array | None:
         """Shape (planes,), m; NaN where a plane has no cable."""
-        return None if now.chain is None else now.by_plane(now.chain.wound.sum(axis=1))
+        return None if now.chain is None else now.by_plane(now.chain.wound.sum(axis=-1))
 
 
 # Stress of the rods.

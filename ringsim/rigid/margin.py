@@ -92,6 +92,7 @@ class DriveMargin:
         self.kinds = [PULLEYS, *(one.kind for one in self._resistances)]
         self.start = math.pi - 2.0 * scene.structure.coordinate
         """Opening angle at which the scene begins, rad."""
+        self._found: dict[tuple[float, float], Margin] = {}
 
     @property
     def factors(self) -> dict[str, float]:
@@ -107,6 +108,12 @@ class DriveMargin:
         """At an opening angle (rad), with what is whole and on at a time (s): at rest, or with
         ``keep_speed`` at the speed that the winches are commanded to.
         """
+        # Searches of the whole drive and of each plane's ask for the same angles.
+        if (angle, time) not in self._found:
+            self._found[angle, time] = self._at(angle, time)
+        return self._found[angle, time]
+
+    def _at(self, angle: float, time: float) -> Margin:
         standard, now = self.standard, self.mechanism.at(0.5 * (math.pi - angle))
         over, state = self.drive.reeved(now), self.conditions.at(time)
         rate, factor = self.drive.speed(over, state), standard.friction
@@ -293,9 +300,9 @@ def with_margin(
     lock = float(outcome.values.get("deployment_time", math.nan))
     way = passed(times, outcome.values["opening_angle"], lock)
     scenes = [*((until, substituted(one)) for until, one in before), (math.inf, scene)]
-    drives = [(until, _drive(one, scene.margin)) for until, one in scenes[:-1]]
+    earlier = [(until, _drive(one, scene.margin)) for until, one in scenes[:-1]]
     last = DriveMargin(scene, scene.margin)
-    drives.append((math.inf, last))
+    drives = [*earlier, (math.inf, last)]
     kinds = list(dict.fromkeys(kind for _, drive in drives if drive for kind in drive.kinds))
     available, margin = np.full((2, len(times)), np.nan)
     resisting = np.full((len(kinds), len(times)), np.nan)
@@ -324,7 +331,7 @@ def with_margin(
             "least_drive_margin_time": np.asarray(least.time),
             "least_drive_margin_angle": np.asarray(math.degrees(least.angle)),
         }
-    by_plane = _by_plane(outcome, scenes, scene.margin)
+    by_plane = _by_plane(outcome, drives)
     if np.isfinite(by_plane).any():
         values["least_drive_margin_plane"] = by_plane
         values["least_plane_margin"] = np.asarray(by_plane.min())
@@ -336,25 +343,17 @@ def with_margin(
     )
 
 
-def _drive(
-    scene: Scene, standard: MarginStandard, plane: int | None = None
-) -> DriveMargin | None:  # fmt: skip
-    """Of both planes, or one; None of a scene whose winches pulled with any force: it had no
-    margin.
-    """
+def _drive(scene: Scene, standard: MarginStandard) -> DriveMargin | None:
+    """None of a scene whose winches pulled with any force: it had no margin."""
     try:
-        return (
-            DriveMargin(scene, standard) if plane is None else PlaneMargin(scene, standard, plane)
-        )
+        return DriveMargin(scene, standard)
     except InputError:
         return None
 
 
-def _by_plane(
-    outcome: Outcome, scenes: Sequence[tuple[float, Scene]], standard: MarginStandard
-) -> Array:  # fmt: skip
+def _by_plane(outcome: Outcome, drives: Sequence[tuple[float, DriveMargin | None]]) -> Array:
     """The least margin of each plane at the mean angles of its own V-joints, until it has locked,
-    shape (planes,), of scenes each until a time (s); NaN unless there are cables in two planes.
+    shape (planes,), of drives each until a time (s); NaN unless there are cables in two planes.
     """
     opening = outcome.values["opening_angle"]
     locks = outcome.values.get("lock_time", np.full(opening.shape[:2], math.nan)).max(axis=1)
@@ -362,12 +361,11 @@ def _by_plane(
     for plane, lock in enumerate(locks.tolist()):
         way = passed(outcome.coordinates["time"], opening[[plane]], lock)
         begin = -math.inf
-        for until, scene in scenes:
-            two = scene.cables is not None and len(scene.cables.present()) == 2
-            drive = _drive(scene, standard, plane) if two else None
+        for until, drive in drives:
             inside = len(way.times) and begin <= way.times[-1] and until > way.times[0]
-            if drive is not None and inside and begin < drive.conditions.end:
-                least = least_along(drive, way.between(begin, until))
+            two = drive is not None and len(drive.drive.cables) == 2
+            if drive is not None and two and inside and begin < drive.conditions.end:
+                least = least_along(PlaneMargin(drive, plane), way.between(begin, until))
                 found[plane] = np.fmin(found[plane], least.margin)
             begin = until
     return found
@@ -390,16 +388,13 @@ class PlaneMargin(DriveMargin):
     so that the mean of both planes is the margin of the whole.
     """
 
-    def __init__(self, scene: Scene, standard: MarginStandard, plane: int) -> None:
-        super().__init__(scene, standard)
-        self._plane = plane
-
-    whole = DriveMargin.at
-    """Of both planes."""
+    def __init__(self, whole: DriveMargin, plane: int) -> None:
+        vars(self).update(vars(whole))
+        self.whole, self._plane = whole, plane
 
     def at(self, angle: float, time: float = 0.0) -> Margin:
         """See ``DriveMargin``; what drives is that of the plane."""
-        whole = self.whole(angle, time)
+        whole = self.whole.at(angle, time)
         ideal, factored = whole.pulls[:, self._plane] - whole.pulls[:, 1 - self._plane]
         half = {source: 0.5 * force for source, force in whole.driving.items()}
         half[CABLES] += 0.5 * float(ideal)

@@ -183,8 +183,8 @@ class Mechanism:
     def __init__(self, scene: Scene, at: float | None = None, layout: Layout | None = None) -> None:
         self.points = points = Points(scene, at, layout)
         self.switches = Switches(points.layout.angle_laws)
-        masses = points.layout.point_masses()[0]
-        places = points.fit(lambda layout: layout.point_masses()[2:])
+        masses = points.layout.point_masses[0]
+        places = points.fit(lambda layout: layout.point_masses[2:])
         count, flat = places.shape[-1], places.reshape(len(masses), -1)
         self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
         second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)

@@ -166,7 +166,7 @@ def first_reaction(layout: Layout, moving: Acceleration) -> Array | None:
         return body_reaction(layout.spacecraft, base.axes, *own, np.zeros(3))
     if not layout.supports:
         return None
-    masses, _, places, rates = layout.point_masses()
+    masses, _, places, rates = layout.point_masses
     accelerations = [moving.at(*one) - gravity for one in zip(places, rates, strict=True)]
     pulled = masses[:, None] * np.array(accelerations)
     arms = places - base.place

@@ -62,13 +62,13 @@ class Rest(Remembering):
         ``ahead`` tells how far (rad) each V-joint is from the stop that it moves to, infinite if
         from none, by its opening angle and by how far it has moved, rad.
         """
-        moved: Array = now.angles - self._angles
-        if now.driven or np.abs(moved).max() > MOVED:
+        if now.driven or np.abs(now.angles - self._angles).max() > MOVED:
             self.begin(now)
         late = now.time - self._since > 0.5 * self.window
         self._largest[late] = max(self._largest[late], now.energies.kinetic)
         if now.time - self._since < self.window:
             return False
+        moved: Array = now.angles - self._angles
         creeping = np.abs(moved) / (now.time - self._since) * (self._end - now.time)
         arrives = np.any(_MARGIN * creeping >= ahead(now.angles, moved))
         if not arrives and self._largest[True] <= max(GROWTH * self._largest[False], self._still):

@@ -213,8 +213,10 @@ class Guard(Remembering):
         self, time: float, balance: float, least: float, factor: float, bound: str
     ) -> Reason:
         """Why an imbalance B in J is too large; X counts as ``least`` (J) at least."""
-        scale = max(least, of_ranges(*self._ranges()))
         # Not <=: an unknown balance (NaN) stops nothing.
+        if not abs(balance) > factor * self._tolerance * least:
+            return Reason()
+        scale = max(least, of_ranges(*self._ranges()))
         if not abs(balance) > factor * self._tolerance * scale:
             return Reason()
         share, limit = 100.0 * abs(balance) / scale, 100.0 * self._tolerance

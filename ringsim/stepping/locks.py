@@ -80,13 +80,15 @@ class Locks(Remembering):
 
     def note(self, angles: Array) -> None:
         """Remember the joints that have reached a stop; opening angles in rad."""
-        self.deployed |= angles >= math.pi
-        self.stowed |= self._away & (angles <= self._stowed_angle)
-        off = angles > self._stowed_angle + _NEAR
-        self._away |= off
-        if self.reached is Fate.FOLDED and off.all():
+        low, stop = float(angles.min()), self._stowed_angle
+        if angles.max() >= math.pi:
+            self.deployed |= angles >= math.pi
+        if low <= stop:
+            self.stowed |= self._away & (angles <= stop)
+        self._away |= angles > stop + _NEAR
+        if self.reached is Fate.FOLDED and low > stop + _NEAR:
             self.reached, self.stowed = Fate.NONE, np.zeros_like(self.stowed)
-        elif self.reached is not Fate.FOLDED and self.stowed.all():
+        elif self.reached is not Fate.FOLDED and low <= stop and self.stowed.all():
             self.reached, self.deployed = Fate.FOLDED, np.zeros_like(self.deployed)
         elif self.reached is Fate.NONE and self.deployed.all():
             self.reached = Fate.DEPLOYED
@@ -101,7 +103,7 @@ class Locks(Remembering):
         that and this step goes on for long behind it; else None.  None is below ``least`` (s).
         """
         step, wanted = found.time - before.time, list[float]()
-        for row in self._acted_on:
+        for row in self._acted_on if found.angles.max() >= math.pi else ():
             there = found.angles[row] >= math.pi
             if (self.deployed[row] | there).all() and not self.deployed[row].all():
                 times, angles, rates = (
@@ -118,8 +120,8 @@ class Locks(Remembering):
     @property
     def unlatched(self) -> bool:
         """Whether all V-joints have reached 180 deg, and latches of some have not caught."""
-        missing = None if self._latches is None else self._latches.missing(self.deployed)
-        return missing is not None and bool(self.deployed.all() and missing.any())
+        latches = self._latches if self.deployed.all() else None
+        return latches is not None and bool(latches.missing(self.deployed).any())
 
     def ahead(self, angles: Array, moved: Array) -> Array:
         """Way (rad) to the stop in the direction of each V-joint's motion; infinite behind it."""
@@ -129,9 +131,10 @@ class Locks(Remembering):
 
     def overrun(self, now: Instant) -> Overrun:
         """The V-joint that is farthest past its stop; 0 where there are none."""
-        if not self.stops:
+        low, high = self._stowed_angle, math.pi
+        if not self.stops or (now.angles.max() <= high and now.angles.min() >= low):
             return Overrun()
-        past: Array = np.maximum(now.angles - math.pi, self._stowed_angle - now.angles)
+        past: Array = np.maximum(now.angles - high, low - now.angles)
         plane, section = divmod(int(past.argmax()), past.shape[1])
         return Overrun(float(past[plane, section]), self._name(plane, section), now.time)
 
@@ -158,22 +161,24 @@ class Locks(Remembering):
         Those that came to 180 deg and that no latch holds may come there again.
         """
         angles, rates, low, high = now.angles, now.rates, self._stowed_angle, math.pi
-        away = ~self.deployed
-        if self._latches is not None:
+        away, some = ~self.deployed, bool(self.deployed.any())
+        if some and self._latches is not None:
             away |= self._latches.missing(self.deployed) & (angles <= high - _NEAR)
-        folding = (rates < 0.0) & self._away & ~self.stowed & (angles > low)
-        waiting, opening = np.full(rates.shape, math.inf), (rates > 0.0) & away
-        np.divide(high - angles, rates, out=waiting, where=opening)
-        np.divide(low - angles, rates, out=waiting, where=folding)
+        waiting = np.full(rates.shape, math.inf)
+        np.divide(high - angles, rates, out=waiting, where=(rates > 0.0) & away)
+        if rates.min() < 0.0:
+            folding = (rates < 0.0) & self._away & ~self.stowed & (angles > low)
+            np.divide(low - angles, rates, out=waiting, where=folding)
         first = int(waiting.argmin())
+        time_to_next, rate_of_next = float(waiting.flat[first]), abs(float(rates.flat[first]))
+        # Most of a run no V-joint is anywhere near a stop that it has reached.
+        if not some and angles.min() >= low + _NEAR:
+            return StopContact(time_to_next, rate_of_next)
         resting = self.deployed & (angles > high - _NEAR)
         if self.stops:
             resting |= (self.stowed & (angles < low + _NEAR)) | (angles < low)
-        return StopContact(
-            time_to_next=float(waiting.flat[first]),
-            rate_of_next=abs(float(rates.flat[first])),
-            resting_rate=float(np.abs(rates[resting]).max()) if resting.any() else 0.0,
-        )
+        speed = float(np.abs(rates[resting]).max()) if resting.any() else 0.0
+        return StopContact(time_to_next, rate_of_next, speed)
 
 
 def locks_of(scene: "Scene", angles: Array, latches: "Latches") -> Locks | None:

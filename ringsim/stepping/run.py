@@ -153,7 +153,7 @@ class Run(Remembering):
         tensions, stretch, driven = None, 0.0, math.isfinite(self._faults.next_time)
         if self._cables is not None and chain is not None:
             tensions = chain.tensions
-            stretch = float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
+            stretch = max([0.0, *chain.strains[chain.ropes.alive].tolist()])
             driven = driven or self._cables.winches.driving(time, chain)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cable_cases import LAWS, random_case
-from ringsim.cable.chain import work_between
+from ringsim.core.chain import work_between
 
 
 def states(steps, law):

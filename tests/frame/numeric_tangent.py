@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ringsim.core.library import call
 from ringsim.frame.model import FrameModel
-from ringsim.frame.state import State, Strains, move
+from ringsim.frame.state import State, move
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
@@ -30,13 +30,11 @@ class Probe:
 
     def residual(self, by: Array) -> Array:
         self._now = self._moved(by)
-        elements = len(self.model.mesh.length)
-        # Strains that rise from zero in the step.
-        self._strains = Strains(self._now.strains, np.zeros((elements, 6)), 1.0 / self.step)
-        return self._unbalanced(self._now, self._strains)
+        return self._unbalanced(self._now)
 
-    def _unbalanced(self, now: State, strains: Strains) -> Array:
-        given = self._start.table, now.table, strains
+    def _unbalanced(self, now: State) -> Array:
+        now.strains.lead[0] = 1.0 / self.step  # strains that rise from zero in the step
+        given = self._start.table, now.table
         assert self.model.core("unbalance", self.time, self.step, now, *given) == 0
         return self.model.system.g.copy()
 
@@ -69,15 +67,13 @@ class Probe:
         move(self.model.mesh, state.pose, by[:unknowns])
         if self.model.with_hub:
             state.hub += by[-3:]
-        elements = len(self.model.mesh.length)
-        strains = Strains(state.strains, np.zeros((elements, 6)), 1.0 / self.step)
-        return self._unbalanced(state, strains)
+        return self._unbalanced(state)
 
     def solved(self) -> Array:
         """What the factored tangent gives for unit residuals: minus its inverse."""
         self.residual(self.by)
         now, model, found = self._now, self.model, np.eye(self.model.size)
-        assert model.core("stiffen", self.time, self.step, now, now.table, self._strains) == 0
+        assert model.core("stiffen", self.time, self.step, now, now.table) == 0
         roped = model.unroped if model.cables is None else model.cables.roped
         for row in found:
             call("relax", model.system, roped, row)

@@ -87,7 +87,7 @@ def _loaded(ends: Ends) -> tuple[Pose, Array, Array, Array, Array]:
     pose = Pose(points.copy(), np.array([ends.r1, ends.r2]), np.zeros(0))
     now, loads, found = np.zeros((1, 6)), room_for_loads(_MESH), np.zeros(12)
     rest = np.zeros((2, 3))
-    add_forces(_MESH, pose, points, rest, Strains(now, np.zeros((1, 6)), 0.0), loads, found)
+    add_forces(_MESH, pose, points, rest, Strains(now, np.zeros((1, 6)), np.zeros(1)), loads, found)
     return pose, points, now[0], loads, found
 
 

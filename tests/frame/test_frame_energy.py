@@ -9,7 +9,6 @@ from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter
-from ringsim.frame.state import Strains
 from ringsim.scene import load_scene
 from ringsim.stepping.instant import Passing, lost_between
 
@@ -73,16 +72,18 @@ def test_the_core_takes_losses_and_energies_as_the_formulas_say() -> None:
         state = model.start.copy()
         state.pose.angle[:] += 1e-3 * random.normal(size=state.pose.angle.shape)
         state.followed.rate[:] = random.normal(size=state.followed.rate.shape)
-        state.strains[:] = 1e-5 * random.normal(size=state.strains.shape)
-        before = 1e-3 * random.normal(size=state.strains.shape)
-        told.append(meter.read(time, state, Strains(state.strains, before, 50.0))[0])
+        strain, before, lead = state.strains
+        strain[:] = 1e-5 * random.normal(size=strain.shape)
+        before[:] = 1e-3 * random.normal(size=strain.shape)
+        lead[0] = 50.0
+        told.append(meter.read(time, state)[0])
         meter.keep()
-        straining = 50.0 * state.strains + before
+        straining = 50.0 * strain + before
         forces = model.laws.damping * state.rate.angles, 1e-3 * mesh.stiffness * straining
-        places, rates = (state.pose.angle, state.strains), (state.rate.angles, straining)
+        places, rates = (state.pose.angle, strain), (state.rate.angles, straining)
         rows = (np.concatenate([a.ravel(), b.ravel()]) for a, b in (forces, rates, places))
         passings.append(Passing(time, *rows))
-        elastic = 0.5 * np.sum(mesh.stiffness * state.strains**2)
+        elastic = 0.5 * np.sum(mesh.stiffness * strain**2)
         assert told[-1].elastic == pytest.approx(elastic, rel=1e-12)
     assert model.laws.damping.max() > 0.0
     assert told[0].lost == 0.0

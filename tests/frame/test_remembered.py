@@ -82,7 +82,7 @@ def inside(thing: Any) -> dict[Any, Any] | None:
         own = {name: one for name, one in own.items() if name != "_rooms"}
     if isinstance(thing, Readings):
         # They look at a state when it is read.
-        own = {name: one for name, one in own.items() if name not in ("now", "_state", "_strains")}
+        own = {name: one for name, one in own.items() if name not in ("now", "_state")}
     return own
 
 
@@ -94,6 +94,7 @@ def parts(run: Storing) -> dict[str, Any]:
     """All that a run has, but the states that it has stored."""
     own = {name: value for name, value in vars(run).items() if name not in BEGUN_ANEW}
     cables = run.model.cables
+    assert run.history.readings  # by now: some are made of many steps at once
     own["laws"] = run.model.laws
     return own if cables is None else own | {"winches": cables.winches, "ropes": cables.ropes}
 

@@ -126,7 +126,7 @@ def test_a_commanded_speed_leaves_less_torque_and_counts_viscous_friction() -> N
 def test_each_plane_has_its_own_cable_against_half_of_all_that_resists() -> None:
     weak = {"cables.lower.winch.winding": MOTOR | {"stall_torque": 0.0005}}
     scene = ring(joints__vjoint={"coulomb": 0.05}, loads__force=0.1).with_values(weak)
-    planes = [PlaneMargin(scene, PLAIN, number) for number in (0, 1)]
+    planes = [PlaneMargin(DriveMargin(scene, PLAIN), number) for number in (0, 1)]
     for angle in ANGLES[1:3]:
         shortening = -by_differences(lambda at: spans(scene, at)[0], angle)
         cosine = 0.04 * np.cos(0.5 * spans(scene, angle)[1])

@@ -96,7 +96,7 @@ def test_a_stuck_joint_holds_the_ring() -> None:
     scene = struck({"kind": "stuck-vjoint", "section": 2})
     assert margins(scene) == [-1.0] * len(ANGLES)
     assert DriveMargin(scene, ECSS).least().margin == -1.0
-    assert PlaneMargin(scene, ECSS, 1).at(1.2).margin == -1.0
+    assert PlaneMargin(DriveMargin(scene, ECSS), 1).at(1.2).margin == -1.0
 
 
 def test_a_latch_that_does_not_catch_changes_nothing() -> None:
@@ -137,7 +137,7 @@ def test_a_jam_beside_one_of_two_winches_leaves_each_its_friction() -> None:
 
 def test_planes_have_what_is_left_of_their_cables() -> None:
     scene = struck(CUT)
-    upper, lower = (PlaneMargin(scene, PLAIN, plane).at(1.5) for plane in (0, 1))
+    upper, lower = (PlaneMargin(DriveMargin(scene, PLAIN), plane).at(1.5) for plane in (0, 1))
     springs = 12.0 * (0.01 + 0.004 * (math.pi - 1.5))
     assert lower.driving[CABLES] == pytest.approx(0.0, abs=1e-12)
     assert lower.available == pytest.approx(0.5 * springs, rel=1e-9)

@@ -33,7 +33,7 @@ def test_weight_resists_with_its_virtual_work(degrees: float) -> None:
     def work(at: float) -> float:
         """Of the weights, J, in the axes of the body that is held, where it is."""
         layout = layout_of(scene, 0.5 * (math.pi - at))
-        masses, _, places = layout.point_masses()[:3]
+        masses, _, places = layout.point_masses[:3]
         (support,) = layout.supports
         held = layout.bodies[support.second.body].pose
         own = (np.asarray(places).reshape(-1, 3) - held.place) @ held.axes

@@ -27,7 +27,7 @@ def momentum(scene: Any, q: float, rate: float) -> np.ndarray[Any, Any]:
     fold at a rate (rad/s), in the base's axes.
     """
     layout = layout_of(scene, q)
-    masses, _, places, rates = layout.point_masses()
+    masses, _, places, rates = layout.point_masses
     base = layout.bodies[layout.base or 0].pose
     turn = base.turn
     moving = rates - base.rate - np.cross(turn, places - base.place)
@@ -48,7 +48,7 @@ def test_it_is_the_rate_of_momentum_at_rest_less_the_weight(sections: int, gravi
     base = layout.bodies[layout.base or 0].pose
     expected = momentum(scene, q, moving.coordinate) @ base.axes.T
     if gravity is not None:
-        masses, _, places, _ = layout.point_masses()
+        masses, _, places, _ = layout.point_masses
         expected[0] -= masses.sum() * np.array(gravity)
         expected[1] -= np.cross(masses @ (places - base.place), gravity)
     assert np.abs(expected).max() > 1e-3

@@ -146,11 +146,11 @@ def rayleigh(standing: Standing, vector: Any) -> float:
     by, start = 1e-6 / np.abs(standing.moving @ vector).max(), standing.state.copy()
     forces = []
     for way in (by, -by):
-        standing.state.take(start)
+        standing.state.recall(start.memory())
         move(standing.model.mesh, standing.state.pose, way * vector[: standing.model.mesh.unknowns])
         standing.state.hub += way * vector[-3:] if standing.model.with_hub else 0.0
         forces.append(standing.unbalance().copy())
-    standing.state.take(start)
+    standing.state.recall(start.memory())
     push = vector @ (forces[0] - forces[1]) / (2.0 * by)
     return float(push / (vector @ (standing.mass @ vector)))
 

@@ -109,8 +109,7 @@ typedef struct {
 } Pose;
 
 typedef struct {
-    Reals now, before;
-    D lead;
+    Reals now, before, lead;
 } Strains;
 
 /* ringsim.frame.elimination */
@@ -176,6 +175,7 @@ typedef struct {
     Pose pose;
     Reals hub;
     Followed followed;
+    Strains strains;
 } State;
 
 typedef struct {
@@ -209,7 +209,7 @@ typedef struct {
 /* ringsim.core.tension */
 typedef struct {
     Ints starts, ends, near, pulley, felt;
-    Reals alive, material, slip_speed;
+    Reals content, alive, material, slip_speed;
 } Ropes;
 
 typedef struct {
@@ -246,6 +246,12 @@ typedef struct {
     Reals loads, kept, lengths, weights, g, changes, reaction;
     I hub;
 } System;
+
+/* Number of a rope's cable, and whether the rope is at its beginning and at its end. */
+typedef struct {
+    I cable;
+    bool begins, ends;
+} Place;
 
 static inline Mat axes_of(const Pose *pose, I frame) { return matrix(pose->axes.at + 9 * frame); }
 
@@ -290,6 +296,7 @@ void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, con
                    I wide);
 D measure(const Ropes *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
           I n_rates, const Spans *spans);
+Place place_behind(const Ropes *ropes, I rope, Place before);
 D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g);
 I find_slopes(const Roped *roped, const Laws *laws);
 void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,

@@ -37,12 +37,12 @@ static D lost_between(const D *before, const D *after, I n, D step) {
 
 /* Read a state: what takes energy there, shape (3, n), and what is told of it.  Kept is the same of
    the state so long before, or empty. */
-void read_energies(const System *system, const State *now, const Strains *strains, D step,
-                   D *passing, I n_passing, const D *kept, I n_kept, D *told, I n_told) {
+void read_energies(const System *system, const State *now, D step, D *passing, I n_passing, const D *kept, I n_kept, D *told, I n_told) {
     (void)n_told;
     const Mesh *mesh = &system->mesh;
     const Held *held = &system->held;
     const Web *web = &system->web;
+    const Strains *strains = &now->strains;
     const I *cuts = held->cuts.at;
     const D *rate = now->followed.rate.at;
     const D *angles = now->pose.angle.at, *turning = rate + cuts[ANGLES];
@@ -71,12 +71,41 @@ void read_energies(const System *system, const State *now, const Strains *strain
         told[KINETIC] += 0.5 * web->hub_mass * dot(moving, moving);
     }
 
+    D lead = strains->lead.at[0];
     I before = first + count + web->first.n;
     for (I k = 0; k < each - before; k++) {
-        D straining = strains->lead * strains->now.at[k] + strains->before.at[k];
+        D straining = lead * strains->now.at[k] + strains->before.at[k];
         passing[before + k] = mesh->tau.at[k / 6] * mesh->stiffness.at[k] * straining;
         passing[each + before + k] = strains->now.at[k];
         passing[2 * each + before + k] = straining;
     }
     told[LOST] = n_kept > 0 ? lost_between(kept, passing, each, step) : 0.0;
+}
+
+/* Two rows of a chain: works (J) from one to the other, put in by the winches less what is wound up,
+   and lost; see ringsim.cable.chain.work_between. */
+void work_of_ropes(const Ropes *ropes, const I *behind, I pulleys, const D *before, I n_before,
+                   const D *after, I n_after, D *out, I n_out) {
+    (void)n_before, (void)n_after, (void)n_out;
+    I count = ropes->starts.n, n = ropes->near.n, forces = 7 * n + 4 * pulleys, held = forces + pulleys;
+    I natural = held + pulleys, strains = natural + 4 * count, viscous = natural + 8 * count;
+    I density = viscous + count, wound = density + count, j = 0;
+    Place place = {-1, false, false};
+    D driven = 0.0, lost = 0.0;
+    for (I rope = 0; rope < count; rope++) {
+        I first = ropes->starts.at[rope], last = ropes->ends.at[rope] - 1;
+        place = place_behind(ropes, rope, place);
+        const D *turned = after + wound + 2 * place.cable, *had = before + wound + 2 * place.cable;
+        D near = place.begins ? turned[0] - had[0] : 0.0, far = place.ends ? turned[1] - had[1] : 0.0;
+        D one = before[strains + rope], two = after[strains + rope];
+        driven += (before[2 * n + first] * (1.0 + one) + after[2 * n + first] * (1.0 + two)) * near;
+        driven += (before[2 * n + last] * (1.0 + one) + after[2 * n + last] * (1.0 + two)) * far;
+        driven -= (before[density + rope] + after[density + rope]) * (near + far);
+        D mean = 0.5 * (before[natural + rope] + after[natural + rope]);
+        lost += (before[viscous + rope] + after[viscous + rope]) * mean * (two - one);
+        /* A jammed pulley belongs to the rope behind it. */
+        for (; j < pulleys && behind[j] <= last; j++)
+            lost += (before[forces + j] + after[forces + j]) * (before[held + j] - after[held + j] - far);
+    }
+    out[0] = 0.5 * driven, out[1] = 0.5 * lost;
 }

@@ -38,7 +38,7 @@ static D weighted(const D *weights, const D *a, const D *b, I n) {
 
 /* Forces out of balance on all unknowns, into system->g. */
 I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, const State *start,
-            const State *now, const Strains *strains) {
+            const State *now) {
     const Mesh *mesh = &system->mesh;
     const I *cuts = system->held.cuts.at;
     const D *rates = now->followed.rate.at;
@@ -48,7 +48,7 @@ I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, c
     roped->border.used.at[STRUNG] =
         balance(mesh, &system->lines, &system->held, &system->joints, &system->web, &system->with,
                 step, &start->followed, &now->pose, now->hub.at, &system->arms, &now->followed,
-                strains, system->kept.at, g, size);
+                &now->strains, system->kept.at, g, size);
     note_joints(&system->joints, &system->rubbing, rates + cuts[ANGLES]);
     if (asks & PARTS && ask(FORCES)) return RAISED;
     if (roped->ropes.starts.n > 0) {
@@ -77,8 +77,7 @@ I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, c
 
    K is in the fronts; z are the changes of tension in all ropes and, where a net's strings pull, the
    places of its hub. */
-I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, const State *now,
-          const Strains *strains) {
+I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, const State *now) {
     const Mesh *mesh = &system->mesh;
     const Border *border = &roped->border;
     const Coefficients *with = &system->with;
@@ -99,7 +98,7 @@ I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, con
     memset(border->corner.at, 0, (size_t)(wide * wide) * sizeof(D));
     for (I k = 0; k < wide; k++) border->corner.at[k * (wide + 1)] = -1.0;
     differentiate(mesh, &system->held, &system->joints, &system->web, &now->pose, &now->followed,
-                  system->kept.at, strains->lead, by_rate, by_place, strung, &system->fronts,
+                  system->kept.at, now->strains.lead.at[0], by_rate, by_place, strung, &system->fronts,
                   border->columns.at, border->rows.at, border->corner.at, wide);
     add_dry_slopes(&system->joints, &system->rubbing, now->pose.angle.at, rates + cuts[ANGLES],
                    by_rate, mesh, &system->fronts);
@@ -156,14 +155,14 @@ void learn(const D *weights, I n, D *changes, I n_changes, D *squares, I n_squar
    round, the residual may grow for an iteration: what it finds there is what tells the way back
    (turning.c), and shorter changes would only find it later. */
 I balance_step(const System *system, const Roped *roped, I asks, Ask ask, D step, const State *start,
-               const State *now, const Strains *strains, D tolerance, D *told, I n_told) {
+               const State *now, D tolerance, D *told, I n_told) {
     (void)n_told;
     I size = system->g.n, unknowns = system->mesh.unknowns, made = 0;
     const D *lengths = system->lengths.at;
     D *g = system->g.at, last = INFINITY, squares[MOST];
     told[0] = told[1] = told[2] = 0.0;
     for (I taken = 0; taken < MOST; taken++) {
-        I how = unbalance(system, roped, asks, ask, step, start, now, strains);
+        I how = unbalance(system, roped, asks, ask, step, start, now);
         if (how != BALANCED) return how;
         D sum = 0.0;
         for (I k = 0; k < size; k++) sum += (g[k] / lengths[k]) * (g[k] / lengths[k]);
@@ -173,7 +172,7 @@ I balance_step(const System *system, const Roped *roped, I asks, Ask ask, D step
         told[0] += 1.0;
         if (taken == 0 || norm > FALL * last) {
             told[1] += 1.0, made = 0;
-            how = stiffen(system, roped, asks, ask, step, now, strains);
+            how = stiffen(system, roped, asks, ask, step, now);
             if (how != BALANCED) return how;
         }
         last = norm;

@@ -151,7 +151,7 @@ void add_forces(const Mesh *mesh, const Pose *pose, const D *points, I n_points,
         V tau = gather(mesh->tau.at, 1, e, 0);
         Vec4 whole[2] = {u, own->psi};
         for (int k = 0; k < 2; k++) {
-            Vec4 rate = plus4(times4(all(strains->lead), whole[k]),
+            Vec4 rate = plus4(times4(all(strains->lead.at[0]), whole[k]),
                               gather_vector(strains->before.at, 6, e, 3 * k));
             Vec4 stiffness = gather_vector(mesh->stiffness.at, 6, e, 3 * k);
             whole[k] = plus4(whole[k], times4(tau, rate));
@@ -386,8 +386,7 @@ void move(const Mesh *mesh, const Pose *pose, const D *step, I n_step) {
 }
 
 /* Changes of all unknowns from one pose to another. */
-void moved_between(const Mesh *mesh, const Pose *before, const Pose *after, D *out, I n_out) {
-    (void)n_out;
+static void moved_between(const Mesh *mesh, const Pose *before, const Pose *after, D *out) {
     for (I f = 0; f < before->place.n; f++) {
         Mat axes = axes_of(before, f), back = transposed(&axes), now = axes_of(after, f);
         Mat by = mul(&now, &back);
@@ -408,4 +407,27 @@ void straighten(const Pose *pose) {
         r = mul(&r, &by);
         store(pose->axes.at + 9 * f, &r);
     }
+}
+
+/* A step: how it begins from a state, and what it has led to. */
+
+/* Begin at the start, moved by changes of all unknowns, the hub's last. */
+void set_out(const Mesh *mesh, const State *start, const State *now, const D *by, I n_by) {
+    const Pose *from = &start->pose, *pose = &now->pose;
+    memcpy(pose->place.at, from->place.at, (size_t)(3 * pose->place.n) * sizeof(D));
+    memcpy(pose->axes.at, from->axes.at, (size_t)(9 * pose->axes.n) * sizeof(D));
+    memcpy(pose->angle.at, from->angle.at, (size_t)pose->angle.n * sizeof(D));
+    move(mesh, pose, by, 0);
+    for (I k = 0; k < 3; k++) now->hub.at[k] = start->hub.at[k];
+    for (I k = mesh->unknowns; k < n_by; k++) now->hub.at[k - mesh->unknowns] += by[k];
+}
+
+/* Straighten the axes that a step has led to; changes of all unknowns over it, before that. */
+void arrive(const Mesh *mesh, const State *start, const State *now, D *out, I n_out) {
+    moved_between(mesh, &start->pose, &now->pose, out);
+    for (I k = mesh->unknowns; k < n_out; k++) {
+        I own = k - mesh->unknowns;
+        out[k] = now->hub.at[own] - start->hub.at[own];
+    }
+    straighten(&now->pose);
 }

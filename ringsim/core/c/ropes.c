@@ -44,6 +44,29 @@ static Path path_of(const Ropes *ropes, const Spans *spans, I rope) {
     return found;
 }
 
+/* Of the rope behind another one, whose place this is; of the first one behind {-1}. */
+Place place_behind(const Ropes *ropes, I rope, Place before) {
+    const I *near = ropes->near.at, first = ropes->starts.at[rope], behind = ropes->ends.at[rope];
+    bool begins = first == 0 || near[first] != near[first - 1] + 1;
+    bool ends = behind == ropes->near.n || near[behind] != near[behind - 1] + 1;
+    return (Place){before.cable + begins, begins, ends};
+}
+
+/* Let the winches at both ends of each cable have wound so much (m), at rates (m/s). */
+void wind(const Ropes *ropes, const D *wound, I n_wound, const D *rates, I n_rates, const Drums *drums) {
+    (void)n_wound, (void)n_rates;
+    Place place = {-1, false, false};
+    for (I rope = 0; rope < ropes->starts.n; rope++) {
+        place = place_behind(ropes, rope, place);
+        const D *turned = wound + 2 * place.cable, *rate = rates + 2 * place.cable;
+        D near = place.begins ? turned[0] : 0.0, far = place.ends ? turned[1] : 0.0;
+        drums->natural.at[rope] = ropes->content.at[rope] - (near + far);
+        near = place.begins ? rate[0] : 0.0, far = place.ends ? rate[1] : 0.0;
+        drums->winding.at[rope] = near + far;
+        drums->inflow.at[rope] = -far;
+    }
+}
+
 /* Speeds of the ropes over the pulleys, and exponents of their friction. */
 void slide(const Ropes *ropes, const Drums *drums, const Spans *spans) {
     for (I rope = 0; rope < ropes->starts.n; rope++) {
@@ -131,14 +154,23 @@ static D energy_of(D force, D width) {
     return width * width * (z > 0.0 ? 0.5 * z * z + SIXTH - sum : sum);
 }
 
-/* Of ropes whose spans are known, shape (8, ropes): paths and their rates, strains and theirs, forces
-   before slack, mean tensions and the viscous part of these (N), and elastic energy per natural
-   length (J/m).  Of pulleys, shape (2, pulleys): tension lost there times the stretch (N), and
-   natural length up to the rope's far end (m). */
-void of_ropes(const Ropes *ropes, const Drums *drums, const Spans *spans, const I *behind, I pulleys,
-              const D *log_decays, I n_log_decays, D *out, I n_out, D *of_pulleys, I n_of_pulleys) {
-    (void)n_log_decays, (void)n_out, (void)n_of_pulleys;
-    I count = ropes->starts.n, j = pulleys - 1;
+static D *append(D *to, const D *from, I n) {
+    memcpy(to, from, (size_t)n * sizeof(D));
+    return to + n;
+}
+
+/* What a chain tells whose spans are known, one behind the other (ringsim.cable.ropes.PARTS). */
+void read_chain(const Ropes *ropes, const I *behind, I pulleys, const Drums *drums, const Spans *spans,
+                const D *log_decays, I n_log_decays, const D *wound, I n_wound, const D *wound_rate,
+                I n_wound_rate, D *out, I n_out) {
+    (void)n_log_decays, (void)n_out;
+    I count = ropes->starts.n, n = spans->length.n, j = pulleys - 1;
+    out = append(append(out, spans->length.at, n), spans->rate.at, n);
+    out = append(append(out, spans->tension.at, n), spans->share.at, n);
+    out = append(append(out, spans->unit.at, 3 * n), spans->angle.at, pulleys);
+    out = append(append(out, spans->speed.at, pulleys), spans->exponent.at, pulleys);
+    D *forces = append(out, log_decays, pulleys), *held = forces + pulleys;
+    out = append(append(held + pulleys, drums->natural.at, count), drums->winding.at, count);
     for (I rope = count - 1; rope >= 0; rope--) {
         const D *material = ropes->material.at + 3 * rope;
         Path path = path_of(ropes, spans, rope);
@@ -155,11 +187,12 @@ void of_ropes(const Ropes *ropes, const Drums *drums, const Spans *spans, const 
             beyond += spans->length.at[i];
             if (j < 0 || behind[j] != i) continue;
             D lost = -expm1(spans->exponent.at[j] * log_decays[j]) * (ropes->pulley.at[i] >= 0);
-            of_pulleys[j] = spans->tension.at[i - 1] * lost * (1.0 + strain);
-            of_pulleys[pulleys + j] = beyond * natural / path.length;
+            forces[j] = spans->tension.at[i - 1] * lost * (1.0 + strain);
+            held[j] = beyond * natural / path.length;
             j--;
         }
     }
+    append(append(out + 8 * count, wound, n_wound), wound_rate, n_wound_rate);
 }
 
 /* Let laws see the pulleys (ringsim.cable.friction.Pulleys). */
