@@ -19,7 +19,7 @@ project_copyright = "2026, the ringsim developers"
 release = importlib.metadata.version("ringsim")
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "offline_math"]
-exclude_patterns = ["_build", "README.md", "paper"]
+exclude_patterns = ["_build", "README.md"]
 html_theme = "furo"
 html_math_renderer = "mathml"
 html_title = f"ringsim {release}"

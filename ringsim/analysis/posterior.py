@@ -476,8 +476,7 @@ def sensors_table(found: xr.Dataset) -> Table:
 
 def _seeming(sensors: NDArray[np.str_], after: Array) -> list[str]:
     """A line on sensors with which more seems to be left than without."""
-    least = np.minimum.accumulate(after)
-    worse = [str(each) for each in sensors[1:][after[1:] > _SEEMS * least[:-1]]]
+    worse = [str(each) for each in sensors[1:][after[1:] > _SEEMS * after[:-1]]]
     return [
         f"too few runs to tell how much these add, which seem to take knowledge away, as no sensor "
         f"can: {', '.join(worse)}: raise runs"

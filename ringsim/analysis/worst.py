@@ -421,7 +421,8 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
             continue
         allowed = numbers(campaign, own[path]) if path in own else float(scene[path])
         values = _largest(campaign, peak, series)
-        ratio = np.where(good(campaign) & (values > 0.0), allowed / values - 1.0, np.nan)
+        loaded = np.where(good(campaign) & (values > 0.0), values, np.nan)
+        ratio = allowed / loaded - 1.0
         if not np.isfinite(ratio).any():
             continue
         k, units = int(np.nanargmin(ratio)), quantities()[peak].units
@@ -429,7 +430,8 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         told = f"{path} = {with_unit(f'{bound:g}', units)}"
         later = series and exceeded(numbers(campaign, peak)[k], values[k])
         of = f"{series} after the last lock, as recorded" if later else peak
-        counts = int((ratio < 0.0).sum()), int(np.isfinite(ratio).sum())
+        known = good(campaign) & np.isfinite(values)  # ropes that never were slack have 0 s of it
+        counts = int((known & (values > allowed)).sum()), int(known.sum())
         rows.append((told, peak, of, float(ratio[k]), float(values[k]), k, *counts))
     least = np.where(good(campaign), numbers(campaign, _DRIVE), np.nan)
     if np.isfinite(least).any():

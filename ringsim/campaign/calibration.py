@@ -47,13 +47,11 @@ SENSORS = "sensors.nc"
 MEMBERS = 1000
 """Samples of a posterior in its file: their 5 % quantile is off by a hundredth in probability."""
 _FINE = 25.0
-"""Records of a run between two readings.  Between records curves are taken as straight, which of a
-rope's first load made 0.1 N of 48 N with five records, and makes a twenty-fifth of it so."""
+"""Records between two readings: straight between them, five made 0.1 N of 48 N of a first load."""
 _MOST_RECORDS = 2000
-"""Records of a run at most, which keeps a stage of 64 runs below half a gigabyte."""
+"""Of a run: a stage of 64 runs stays below half a gigabyte."""
 _LEVELS = (0.05, 0.5, 0.95)
-_ALL = 1.0 - 1e-9
-"""Largest correlation that a campaign takes."""
+_ALL = 1.0 - 1e-9  # the largest correlation that a campaign takes
 _NAME = "ringsim.Calibration"
 """How refusals of arguments begin, as those of files with the file's name."""
 
@@ -92,6 +90,13 @@ class Given:
     def members(self) -> int:
         """Runs of each stage."""
         return self.budget.runs // self.budget.stages
+
+    def require_readings(self) -> None:
+        """Refuse (InputError) a test that is still to come."""
+        if self.measurement.file.planned:
+            where = f"{self.campaign.file.name}: measured = {self.budget.measured}"
+            cure = "ringsim sensors takes it; or give its table as file, and clock.column"
+            raise InputError(f"{where}: this test is still to come: {cure}")
 
 
 def calibration_of(
@@ -279,11 +284,8 @@ class _Course:
     def order(self) -> Order:
         """The next stage, from the results of those before."""
         given, asked = self.given, self.given.campaign.specification
-        if given.measurement.file.planned and not self.planning:
-            raise InputError(
-                f"{given.campaign.file.name}: measured = {given.budget.measured}: this test is "
-                "still to come (ringsim sensors): give its table as file, and clock.column"
-            )
+        if not self.planning:
+            given.require_readings()
         unknowns, number = Unknowns.of(given), len(self.points)
         if number:
             self._learn(unknowns)

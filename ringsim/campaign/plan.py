@@ -5,9 +5,11 @@ is being filled.
 import contextlib
 import json
 import shlex
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,11 +140,13 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
 def plan_of_course(
     order: Order, runs: int, checks: int, workers: int, say: Callable[[str], None]
 ) -> list[str]:
-    """What campaigns one after the other cost that are like an order, whose folder has no runs: so
-    many runs, and checks by the judging engine; arguments and lines as of ``plan``.
+    """What campaigns one after the other cost that are like an order, with no runs yet: so many
+    runs, and checks by the judging engine; arguments and lines as of ``plan``.
     """
     table = order.campaign.draw()
-    none, todo = survey(order.folder, [""] * table.samples), np.arange(table.samples)
+    todo = np.arange(table.samples)
+    with tempfile.TemporaryDirectory(prefix="ringsim-plan-") as empty:
+        none = survey(Path(empty), [""] * table.samples)
     each, (told,), size = _predicted(order, table, none, todo, lambda sample: sample, 0, say)
     seconds = float(each.mean()) * runs
     lines = [*map(extent_told, table.columns), f"  workers        {workers}"]

@@ -5,8 +5,9 @@ import pickle
 import subprocess
 import sys
 import tomllib
+import uuid
 from collections.abc import Mapping
-from concurrent.futures import Executor, Future, wait
+from concurrent.futures import BrokenExecutor, Executor, Future, wait
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -211,7 +212,11 @@ class Campaign:
                 f"workers = {workers}: an executor runs so many tasks, each with a solver process: "
                 "give 1 or more"
             )
-        return _run_on(executor, workers, order)
+        code = _run_on(executor, workers, order)
+        # Parts side by side know of each other's failures what there was when they began.
+        most = self._described.specification.max_failed
+        many = most is not None and len(open_folder(order.folder).survey().failed) > most
+        return EXIT_FAILED if many and code == EXIT_DONE else code
 
     def _opened(self, folder: Path, code: int) -> xr.Dataset:
         """The merged campaign, or the exception that an exit code stands for."""
@@ -235,8 +240,9 @@ class Campaign:
         return Order(self._described, folder, Share.parse(part), again, dict(settings))
 
     def _fault(self, folder: Path, found: xr.Dataset) -> str:
-        if left := len(open_folder(folder).survey().missing):
-            most = self._described.specification.max_failed
+        survey, most = open_folder(folder).survey(), self._described.specification.max_failed
+        left = len(survey.missing)
+        if left or (most is not None and len(survey.failed) > most):
             return (
                 f"{folder}: more samples than max_failed = {most} failed, {left} are left: raise "
                 "max_failed, or run again with retry_failed=True (and other settings={...})"
@@ -249,9 +255,14 @@ class Campaign:
 # Campaigns whose parts are tasks of an executor.
 
 
-def run_part(folder: Path, chosen: tuple[Any, ...], number: int, count: int) -> int:
+def run_part(
+    folder: Path, chosen: tuple[Any, ...], share: tuple[int, int], more: bool, call: str
+) -> int:  # fmt: skip
     """Run what is missing of a part of a prepared folder, wherever an executor lets it; the exit
-    code.  ``chosen`` are an order's choices.
+    code.
+
+    ``chosen`` are an order's choices, ``share`` is (k, n), ``more`` as of ``Choices``; ``call``
+    makes each call another one, as dask takes equal calls for one.
 
     It takes a process of its own: executors run tasks side by side in threads, which the library
     of netCDF does not bear.  InputError if it is refused; RuntimeError if that process ends
@@ -260,7 +271,7 @@ def run_part(folder: Path, chosen: tuple[Any, ...], number: int, count: int) -> 
     path = os.pathsep.join(os.path.abspath(each) for each in sys.path)
     done = subprocess.run(
         [sys.executable, "-c", f"from {__name__} import serve_part; serve_part()"],
-        input=pickle.dumps((os.getpid(), folder, chosen, number, count)), check=False,
+        input=pickle.dumps((os.getpid(), folder, chosen, share, more)), check=False,
         stdout=subprocess.PIPE, env=without_mpi() | {"PYTHONPATH": path},
     )  # fmt: skip
     if done.returncode == EXIT_BAD_INPUT:
@@ -272,15 +283,15 @@ def run_part(folder: Path, chosen: tuple[Any, ...], number: int, count: int) -> 
 
 def serve_part() -> None:
     """The process of a part, which is told on standard input which."""
-    parent, folder, chosen, number, count = pickle.load(sys.stdin.buffer)
+    parent, folder, chosen, share, more = pickle.load(sys.stdin.buffer)
     end_with(parent)
     limits, most, _, again, overrides = chosen
-    called = open_folder(folder).attributes["campaign_name"]
     scheduler = Local(1)
     try:
+        called = open_folder(folder).attributes["campaign_name"]
         sys.exit(run_campaign(folder, Choices(
-            scheduler, limits, most, Share(number, count), again, overrides, brief=True,
-            label=f"{called}, part {number}/{count}",
+            scheduler, limits, most, Share(*share), again, overrides, more=more, brief=True,
+            label=f"{called}, part {share[0]}/{share[1]}",
         )))  # fmt: skip
     except InputError as error:
         print(error, end="")
@@ -291,36 +302,45 @@ def serve_part() -> None:
 
 def _run_on(executor: Executor, parts: int, order: Order) -> int:
     """Run an order in so many tasks, each a part with journals of its own; the exit code."""
-    while True:
-        more, tasks = order.prepare(), list[Future[int]]()
-        try:
-            for k in range(parts):
-                tasks.append(executor.submit(
-                    run_part, order.folder.resolve(), order.choices, k + 1, parts
-                ))  # fmt: skip
-            wait(tasks)
-        except BaseException:
-            for task in tasks:
-                task.cancel()  # those that run go on to their end
-            raise
-        codes, lost = set[int](), list[tuple[int, Exception]]()
-        for k, task in enumerate(tasks):
+    code, more = EXIT_DONE, True
+    while more and code == EXIT_DONE:
+        more = order.prepare()
+        code = max(_round(executor, parts, order, more=more))  # a signal's 130, then failure's 3
+    return code
+
+
+def _round(executor: Executor, parts: int, order: Order, *, more: bool) -> set[int]:
+    """The exit codes of all parts of what a folder has now."""
+    folder, tasks, lost = order.folder.resolve(), list[Future[int]](), list[tuple[int, Exception]]()
+    try:
+        for k in range(parts):
+            call = uuid.uuid4().hex
             try:
-                codes.add(task.result())
-            except InputError:
-                raise
-            except Exception as error:  # whatever an executor raises for a worker that has died
+                tasks.append(
+                    executor.submit(run_part, folder, order.choices, (k + 1, parts), more, call)
+                )
+            except BrokenExecutor as error:
                 lost.append((k + 1, error))
-        if lost:
-            number, cause = lost[0]
-            why = f"{type(cause).__name__}: {cause}"
-            raise CampaignError(
-                f"{order.folder}: part {number}/{parts} was lost ({why}): call again to run what "
-                "is left"
-            ) from cause
-        code = max(codes)  # a signal's 130, then failure's 3
-        if code != EXIT_DONE or not more:
-            return code
+                break
+        wait(tasks)
+    except BaseException:
+        for task in tasks:
+            task.cancel()  # those that run go on to their end
+        raise
+    codes = set[int]()
+    for k, task in enumerate(tasks):
+        try:
+            codes.add(task.result())
+        except InputError:
+            raise
+        except Exception as error:  # whatever an executor raises for a worker that has died
+            lost.append((k + 1, error))
+    if lost:
+        number, cause = min(lost, key=lambda each: each[0])
+        why = f"{type(cause).__name__}: {cause}"
+        told = f"{order.folder}: part {number}/{parts} was lost ({why})"
+        raise CampaignError(f"{told}: call again to run what is left") from cause
+    return codes
 
 
 def campaign_text(scene: Scene | str | Path, keys: Mapping[str, Any]) -> str:

@@ -308,8 +308,7 @@ def _cure(error: str, inputs: Mapping[str, Distribution]) -> str:
     side, kind = "low" if bound[1] in ("at least", "above") else "high", show(kind_of(law))
     middle, end = float(np.median(law.quantile(np.array([0.5])))), float(bound[2])
     if middle < end if side == "low" else middle > end:
-        giga = " (1 GPa is 1e9 Pa)" * error.endswith(f"{bound[2]} Pa")
-        return f", and most of its distribution is not: check its numbers{giga}"
+        return "; most of its distribution is beyond that: check its numbers"
     return f': draw it with kind = "truncated", {side} = {bound[2]}, of = {{ kind = {kind}, ... }}'
 
 

@@ -355,6 +355,8 @@ def _course(
 
         def first() -> tuple[Order, int, int]:
             found = given()
+            if not planning:
+                found.require_readings()
             return Order(found.campaign, Path()), found.members * found.budget.stages, 0
 
         return _plan(first, workers)

@@ -171,6 +171,8 @@ def _address(array: Any, letter: str) -> int:
             f"the core takes whole arrays of {wanted} numbers of 64 bits, not {array.dtype} "
             f"{array.shape} with strides {array.strides}"
         )
+    if not array.flags.writeable:
+        return int(array.__array_interface__["data"][0])
     # numpy's own ways to tell it take several times as long.
     return ctypes.addressof(ctypes.c_char.from_buffer(array))
 

@@ -315,8 +315,9 @@ class Output:
         twice = sorted(_declared(cls).keys() & (VARIABLES.keys() | COORDINATES.keys()))
         if twice:
             raise ValueError(f"{cls.__module__}: there is an output {twice[0]} already: rename it")
-        own = vars(cls)  # what reads in its own way says itself whether it does so late
-        cls.late = own.get("late", "read" not in own and (cls.late or cls.read is Output.read))
+        # What reads in its own way says itself, there, whether it does so late.
+        reads = next(each for each in cls.__mro__ if "read" in vars(each))
+        cls.late = vars(cls).get("late", reads is Output or vars(reads).get("late", False))
         COORDINATES.update({variable.name: variable for variable in cls.coordinates})
         OUTPUTS.append(cls)
         OUTPUTS.sort(key=lambda output: output.rank)

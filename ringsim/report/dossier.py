@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import LATE, MARK, NOTE, doubted, off_note
-from ringsim.analysis.design import REACHED, learnt_lines
+from ringsim.analysis.design import REACHED, by_path, learnt_lines
 from ringsim.analysis.engines import differences, verdict
 from ringsim.analysis.influence_text import what_matters
 from ringsim.analysis.intervals import CHECKED, good, numbers, quantities
@@ -339,9 +339,12 @@ def _strength(of: Of) -> Answer:
             worst += f" in sample {sample}; beyond it {beyond}"
             found.result.append(f"{told}: margin {margin}, of {of_what} {worst}")
             found.lacks["factor of safety F"] = "the project's; then (1 + margin) / F - 1"
-        if not own:
-            more = "record.stress = true and " * (name not in of.analysis and "stress" in name)
-            found.lacks[f"allowable of {name}"] = f"{more}{limit}"
+        stress = name == "peak_rod_stress" and name not in of.analysis
+        if stress:
+            found.lacks[name] = "record.stress = true"
+        there = stress or name in of.analysis  # without cables nothing has a tension
+        if there and not own and limit not in of.scene.keys() | by_path(of.campaign).keys():
+            found.lacks[f"allowable of {name}"] = limit
     return found + Answer()
 
 
@@ -381,7 +384,8 @@ def _latching(of: Of) -> Answer:
     if found.result:
         found.result = [line for line in _ends(of) if line.startswith(REACHED)] + found.result
         if rate := of.scene.get("latch.min_rate"):
-            found.evidence.append(f"a latch catches from {rate:g} rad/s on")
+            drawn = ", as drawn" * ("latch.min_rate" in by_path(of.campaign))
+            found.evidence.append(f"a latch catches from {show(rate)} rad/s on{drawn}")
         others = _temperature(of).lacks | _tolerances(of).lacks
         found.lacks |= {what: others[what] for what in others if what.startswith("scatter")}
     return found + _verdicts(of, "latched_joints", "least_latch_rate")

@@ -82,6 +82,14 @@ def test_margins_to_limits_are_those_of_the_worst_sample_at_any_time() -> None:
     assert not margin_table(analyse(made_campaign(8))).rows
 
 
+def test_ropes_that_never_were_slack_count_as_within_the_limit() -> None:
+    slack = np.zeros(8)
+    slack[[2, 5]] = 3.0, 0.5
+    made = with_limits(made_campaign(8).assign(longest_slack=("sample", slack)), slack_duration=1.0)
+    (row,) = margin_table(analyse(made)).rows
+    assert row[-2:] == ("2", "1 of 8")
+
+
 def test_a_limit_that_is_passed_and_a_margin_that_is_short_are_told_above_the_verdicts() -> None:
     made = with_limits(with_motors(made_campaign(8, failed=(0,))), tension=20.0)
     wanted = {"asynchrony_max": {"max": 90.0, **BOUND}}

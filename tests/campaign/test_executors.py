@@ -20,7 +20,9 @@ import xarray as xr
 import ringsim
 from campaign_bench import comparable
 from ringsim import Campaign, CampaignError, InputError
+from ringsim.campaign.python import run_part
 from ringsim.campaign.specification import SOLVERS
+from ringsim.execution.work import Allowance
 
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 MPIEXEC = shutil.which("mpiexec", path=PATH)
@@ -33,6 +35,13 @@ MADE = """
             {"kind": "random", "samples": samples}, seed=3, name="parts", fidelity="frame",
             check_every=3, set={"solver.end_time": 0.2}, **more,
         )
+"""
+DASK = """
+from distributed import Client, LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with Client(cluster) as client:
+            made().run(3, out="o", executor=client.get_executor())
 """
 NAMES: dict[str, Any] = {}
 exec(textwrap.dedent(MADE), NAMES)
@@ -48,7 +57,7 @@ def in_a_script(text: str, folder: Path, *launcher: str) -> subprocess.Completed
     script.write_text(textwrap.dedent(MADE) + textwrap.dedent(text), encoding="utf-8")
     return subprocess.run(
         [*launcher, str(script)], capture_output=True, text=True, timeout=300, check=False,
-        cwd=folder,
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
     )  # fmt: skip
 
 
@@ -89,16 +98,7 @@ def test_ranks_of_mpi_give_what_workers_give(tmp_path: Path, known: xr.Dataset) 
 
 def test_a_dask_cluster_gives_what_workers_give(tmp_path: Path, known: xr.Dataset) -> None:
     pytest.importorskip("distributed")
-    done = in_a_script(
-        """
-        from distributed import Client, LocalCluster
-        if __name__ == "__main__":
-            with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-                with Client(cluster) as client:
-                    made().run(3, out="o", executor=client.get_executor())
-        """,
-        tmp_path, sys.executable,
-    )  # fmt: skip
+    done = in_a_script(DASK, tmp_path, sys.executable)
     assert done.returncode == 0, done.stderr
     require_same(tmp_path / "o", known)
 
@@ -124,20 +124,67 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path, known: xr.Dataset) -> Non
     assert all(each.exists() and each.stat().st_size >= size for each, size in before.items())
 
 
+GROWING = """
+import ringsim
+from ringsim.campaign.python import run_part
+from ringsim.campaign.specification import SOLVERS
+from ringsim.execution.work import Allowance
+SOLVERS["full"] = "fake_solver:run"  # deploys in 2 / sqrt(force) (1 + 1e9 / E)
+def growing():
+    return ringsim.Campaign(
+        "ring18",
+        {"loads.force": {"kind": "lognormal", "mean": 0.02, "standard_deviation": 0.004}},
+        {"kind": "subset-simulation", "of": "deployment_time", "above": 15.5, "samples": 20,
+         "share": 0.5, "replicates": 2},
+        fidelity="full", set={"structure.sections": 6, "boom": "none", "net": "none",
+                              "solver.end_time": 30.0},
+    )
+"""
+
+
+@pytest.mark.parametrize("kind", ["threads", "dask"])
 def test_a_design_that_grows_goes_on_from_level_to_level(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    monkeypatch.setitem(SOLVERS, "full", "fake_solver:run")  # 2 / sqrt(force) (1 + 1e9 / E)
-    force = {"kind": "lognormal", "mean": 0.02, "standard_deviation": 0.004}
-    design = {"kind": "subset-simulation", "of": "deployment_time", "above": 15.5, "samples": 20,
-              "share": 0.5, "replicates": 2}  # fmt: skip
-    small = {"structure.sections": 6, "boom": "none", "net": "none", "solver.end_time": 30.0}
-    own = Campaign("ring18", {"loads.force": force}, design, fidelity="full", set=small)
-    known = own.run(workers=0, out=tmp_path / "alone")
-    with ThreadPoolExecutor(2) as pool:
-        found = own.run(2, out=tmp_path / "parts", executor=pool)
+    """Each level is another round of tasks; dask would take equal ones for those of the last."""
+    monkeypatch.setitem(SOLVERS, "full", SOLVERS["full"])  # as it is now, again in the end
+    names: dict[str, Any] = {}
+    exec(GROWING, names)
+    known = names["growing"]().run(workers=0, out=tmp_path / "alone")
+    if kind == "threads":
+        with ThreadPoolExecutor(2) as pool:
+            names["growing"]().run(2, out=tmp_path / "parts", executor=pool)
+    else:
+        pytest.importorskip("distributed")
+        text = GROWING + DASK.replace('made().run(3, out="o"', 'growing().run(2, out="parts"')
+        done = in_a_script(text, tmp_path, sys.executable)
+        assert done.returncode == 0, done.stderr
+    found = ringsim.open_campaign(tmp_path / "parts")
     assert found.sizes["sample"] == known.sizes["sample"] > 40
     np.testing.assert_array_equal(found["deployment_time"], known["deployment_time"])
+
+
+def test_failures_of_all_parts_count_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(SOLVERS, "full", "fake_solver:fated")  # fails above 0.012 N
+    force = {"kind": "discrete", "values": [0.02, 0.021]}
+    keys: dict[str, Any] = {"set": {"structure.sections": 6, "boom": "none", "net": "none"}}
+    own = Campaign("ring18", {"loads.force": force}, {"kind": "random", "samples": 4},
+                   fidelity="full", max_failed=2, **keys)  # fmt: skip
+    with (
+        ThreadPoolExecutor(2) as pool,
+        pytest.raises(CampaignError, match="more samples than max_failed = 2 failed"),
+    ):
+        own.run(2, out=tmp_path / "o", executor=pool)
+
+
+@pytest.mark.quick
+def test_a_folder_that_a_task_does_not_see_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="there is no such folder"):
+        run_part(
+            tmp_path / "nowhere", (Allowance(), None, None, frozenset(), {}), (1, 2), False, ""
+        )
 
 
 @pytest.mark.quick

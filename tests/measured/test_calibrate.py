@@ -336,8 +336,9 @@ def test_plan_of_sensors_foretells_what_a_test_tells(test_files, found, tmp_path
             float(found[0]["learnt"].sel(unknown=name)), rel=0.25
         )
     assert (plan["learnt"].diff("sensor") < 1e-6).all()
-    refused = CliRunner().invoke(cli, ["calibrate", str(file), "--out", str(tmp_path / "cal")])
-    assert refused.exit_code == 2
+    for more in (["--out", str(tmp_path / "cal")], ["--dry-run"]):
+        refused = CliRunner().invoke(cli, ["calibrate", str(file), *more])
+        assert refused.exit_code == 2
     assert "still to come" in refused.output
 
 

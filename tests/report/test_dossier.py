@@ -262,6 +262,19 @@ def test_a_key_that_is_set_is_no_cure() -> None:
 
 
 @pytest.mark.quick
+def test_rates_of_latches_by_section_and_antennas_without_cables_are_told() -> None:
+    campaign = made_campaign(4).assign(least_latch_rate=("sample", np.array([0.2, 0.3, 0.1, 0.4])))
+    scene = campaign.attrs["scene"]
+    assert "[latch]" not in scene
+    campaign.attrs["scene"] = f"{scene}\n[latch]\nmin_rate = [0.05, 0.06, 0.05, 0.06]\n"
+    told = row(rows_of(campaign), "Latching or locking")["evidence"]
+    assert "a latch catches from [0.05, 0.06, 0.05, 0.06] rad/s on" in told
+    without = row(rows_of(campaign.drop_vars("peak_tension")), "Margin of safety")["result"]
+    assert "limits.tension" not in without
+    assert "limits.tension" in row(rows_of(campaign), "Margin of safety")["result"]
+
+
+@pytest.mark.quick
 def test_every_key_of_a_cure_exists() -> None:
     known = {*tree.paths("scene"), *tree.paths("campaign")}
     text = "\n".join(

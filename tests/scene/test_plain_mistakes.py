@@ -377,7 +377,9 @@ def test_refusals_of_campaigns_tell_the_cure(tmp_path: Path) -> None:
     wrong = law.replace("1e-6", "120.0")
     path.write_text(f'{CAMPAIGN}"rods.young_modulus" = {wrong}\n')
     line = refused("campaign", path, "--dry-run")
-    assert line.endswith("and most of its distribution is not: check its numbers (1 GPa is 1e9 Pa)")
+    assert line.endswith(
+        "120 GPa are 1.2e+11 Pa; most of its distribution is beyond that: check its numbers"
+    )
     wanted = "[requirements]\nasynchrony_max = { max = 9.0, probability = 95, confidence = 0.9 }"
     path.write_text(f"{CAMPAIGN}\n{wanted}\n")
     line = refused("campaign", path, "--dry-run")

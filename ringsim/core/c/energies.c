@@ -83,7 +83,7 @@ void read_energies(const System *system, const State *now, D step, D *passing, I
 }
 
 /* Two rows of a chain: works (J) from one to the other, put in by the winches less what is wound up,
-   and lost; see ringsim.cable.chain.work_between. */
+   and lost; see ringsim.core.chain.work_between. */
 void work_of_ropes(const Ropes *ropes, const I *behind, I pulleys, const D *before, I n_before,
                    const D *after, I n_after, D *out, I n_out) {
     (void)n_before, (void)n_after, (void)n_out;

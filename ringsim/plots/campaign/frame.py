@@ -22,11 +22,11 @@ from ringsim.analysis.campaign_notes import (
 )
 from ringsim.analysis.courses import QUANTILES, ends
 from ringsim.analysis.design import (
+    by_path,
     called,
     endings,
     inputs,
     judged_by,
-    paths_of,
     placement,
     population_of,
     scalars,
@@ -136,7 +136,7 @@ def allowables(campaign: xr.Dataset) -> dict[str, float]:
     if not (text := str(campaign.attrs.get("scene", ""))):
         return {}
     scene = scene_from_toml(text, source="attribute scene")
-    drawn = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
+    drawn = by_path(campaign)
     bounds = {
         one.name: output.limit for output in OUTPUTS if output.limit
         for one in output.variables if one.largest_of == output.variables[0].name
