@@ -382,6 +382,8 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         "least", "most", "worst sample", "samples used",
     )  # fmt: skip
     notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
+    if any(row[-2] == "-" for row in rows):
+        notes.append("no worst sample of outputs of which nothing says which end is worse")
     if within:
         notes.append(f"differ by less than their numerical error: {'; '.join(within)}")
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
@@ -490,6 +492,10 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         "largest difference", "dominates",
     )  # fmt: skip
     notes = [OF_ERRORS] * any(any(c != "-" for c in (row[3], row[6])) for row in rows)
+    untold = {row[-1].partition(" (")[2].rstrip(")") for row in rows if row[-1] != "-"}
+    if len(untold) == 1 and (words := untold.pop()):  # once for all rows
+        rows = [(*row[:-1], row[-1].partition(" (")[0]) for row in rows]
+        notes.append(words)
     tables = [marked(Table(head, rows, notes), analysis)] if every else []
     if "balance" in analysis.dims:
         columns = (analysis[f"balance_{word}"].values.tolist()

@@ -299,8 +299,9 @@ def test_budget_says_which_error_dominates() -> None:
     assert first["numerical (error bars)"] == "0.02"
     assert first["samples with bars"] == "9"
     assert first["largest bar"] == "0.02 (sample 10)"
-    assert first["dominates"] == "sampling (engines not measured)"
-    assert rows["asynchrony_max"]["dominates"] == "numerical (engines not measured)"
+    assert first["dominates"] == "sampling"
+    assert rows["asynchrony_max"]["dominates"] == "numerical"
+    assert "engines not measured" in "\n".join(error_lines(campaign))
     # One Sobol design has no standard error, and a few replicates that of their means.
     one = {"kind": "sobol", "samples": 100}
     alone = errors_of(campaign.assign_attrs(design=json.dumps(one)))["deployment_time"]
