@@ -20,6 +20,7 @@ from ringsim.analysis.intervals import (
     quantities,
 )
 from ringsim.analysis.ladder import Rung, references
+from ringsim.outputs import family
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.tables import counted, readable, text_table, unit_text, with_unit
 from ringsim.variables import GOALS, Fate, Outcome, Status
@@ -69,8 +70,14 @@ def differences(campaign: xr.Dataset) -> list[Difference]:
     ok = good(campaign)
     both = np.flatnonzero(ok & (campaign[f"status{CHECKED}"].to_numpy() == Status.OK))
     stand, placed, found = population_of(campaign), placement(campaign), []
+    same = {each.name for output in family.OUTPUTS if output.of_both for each in output.variables}
     for name, variable in quantities().items():
-        if name not in campaign or f"{name}{CHECKED}" not in campaign or not len(both):
+        if (
+            name in same
+            or name not in campaign
+            or f"{name}{CHECKED}" not in campaign
+            or not len(both)
+        ):
             continue
         frame, full = (numbers(campaign, f"{name}{end}") for end in ("", CHECKED))
         apart, share = _apart(frame[both], full[both])

@@ -304,6 +304,8 @@ class Output:
     """Field of ``ringsim.parts.solver.Limits`` that its largest reading must not pass."""
     of_antenna: ClassVar[bool] = True
     """Whether it tells of the antenna, so that engines are compared by it, not of the run."""
+    of_both: ClassVar[bool] = False
+    """Whether both engines compute it by the same code: neither judges the other by it."""
     late: ClassVar[bool] = False
     """Whether it reads many instants at once, which stand along the first axis, behind them; as
     those do that read nothing."""

@@ -206,6 +206,7 @@ class DriveMargins(Output):
     """
 
     rank = 46
+    of_both = True  # the statics of rigid rods, at angles that hardly differ
     needs = ("margin",)
     coordinates = (
         Variable("resistance", ("resistance",), "1", "kind of resistance to opening", "str"),

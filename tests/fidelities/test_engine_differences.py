@@ -55,6 +55,12 @@ def test_only_samples_that_ended_well_with_both_count() -> None:
     assert found.standard_error == pytest.approx(np.std([10, 11, 12, 13], ddof=1) / 2.0)
 
 
+def test_what_both_engines_compute_alike_judges_neither() -> None:
+    """The margin of the drive is the statics of rigid rods in both."""
+    margin = {"least_drive_margin": [0.1] * 4, "least_drive_margin_checked": [0.1, 0.1, NAN, NAN]}
+    assert [each.name for each in differences(campaign(**margin))] == ["deployment_time"]
+
+
 @pytest.mark.parametrize(
     ("checked", "listed"),
     [([10.0 + 1e-13, 11.0], False), ([10.0, 11.0 + 1e-6], True), ([NAN, 11.0], True)],
