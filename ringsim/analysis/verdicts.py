@@ -335,10 +335,15 @@ def verdict_text(one: Mapping[str, Any]) -> str:
 
 
 def _ended_short(campaign: xr.Dataset) -> Mask:
-    """Which runs ended before their goal: what they never came to cannot exceed a limit."""
+    """Which runs ended before their goal: what they never came to cannot exceed a limit.
+
+    One that is overloaded goes on, and has a time if it deploys all the same.
+    """
     if OUTCOME not in campaign:
         return np.zeros(campaign.sizes["sample"], dtype=bool)
-    return ~np.isin(campaign[OUTCOME].to_numpy(), [-1, Fate.NONE, *GOALS])
+    short = ~np.isin(campaign[OUTCOME].to_numpy(), [-1, Fate.NONE, *GOALS])
+    opened = campaign[OUTCOME].to_numpy() == Fate.OVERLOADED
+    return short & ~(opened & np.isfinite(numbers(campaign, "deployment_time")))
 
 
 def verdict_of(low: float, high: float, probability: float) -> Verdict:

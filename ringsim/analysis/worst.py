@@ -32,7 +32,7 @@ from ringsim.outputs.balance import exceeded
 from ringsim.overrides import flat
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, with_unit
-from ringsim.variables import about
+from ringsim.variables import Fate, about
 
 # What is unusual in the inputs of a sample, in words.
 
@@ -326,7 +326,12 @@ def _failures(
         known = value and None in (wanted.max, wanted.min)
         found.append(_Failure(words, own, badness, value, wanted.min is None if known else None))
     ends, came = endings(campaign), -numbers(campaign, "final_time")
-    found += [_Failure(word, ends == word, stuck, "") for word in short_of_goal(ends)]
+    ratios = [ratio for *_, ratio in _ratios(campaign)]
+    over = -np.fmin.reduce(ratios) if ratios else stuck
+    found += [
+        _Failure(word, ends == word, over if word == Fate.OVERLOADED.word else stuck, "")
+        for word in short_of_goal(ends)
+    ]
     kinds = [word for word in kinds_of_ends(ends) if word.startswith(LOST)]
     found += [_Failure(word, ends == word, came, "") for word in kinds]
     kept: dict[tuple[bytes, str], _Failure] = {}
@@ -350,8 +355,9 @@ def _found(campaign: xr.Dataset, name: str, place: int) -> str:
 
 
 def first_clause(reason: str) -> str:
-    """Why a run ended, without what follows from it."""
-    return reason.split("; ")[0]
+    """Why a run ended, or which limit it passed, without what follows from it."""
+    clauses = reason.split("; ")
+    return next((each for each in clauses if "more than limits." in each), clauses[0])
 
 
 def command(folder: str, sample: int) -> str:
@@ -412,19 +418,8 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
     the peak, ``limit_output``.  Behind these the drive margin of scenes with one, which is one
     already.  Empty without any.
     """
-    scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
-    own = by_path(campaign)
     rows = list[tuple[str, str, str, float, float, int, int, int]]()
-    for limit, peak, series in _limited():
-        path = f"limits.{limit}"
-        if peak not in campaign or (path not in scene and path not in own):
-            continue
-        allowed = numbers(campaign, own[path]) if path in own else float(scene[path])
-        values = _largest(campaign, peak, series)
-        loaded = np.where(good(campaign) & (values > 0.0), values, np.nan)
-        ratio = allowed / loaded - 1.0
-        if not np.isfinite(ratio).any():
-            continue
+    for path, peak, series, allowed, values, ratio in _ratios(campaign):
         k, units = int(np.nanargmin(ratio)), quantities()[peak].units
         bound = float(np.broadcast_to(allowed, ratio.shape)[k])
         told = f"{path} = {with_unit(f'{bound:g}', units)}"
@@ -453,6 +448,24 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         "samples": (np.array(of_all), about("samples that have a value")),
     }
     return xr.Dataset({f"limit_{name}": ("limit", *each) for name, each in columns.items()})
+
+
+def _ratios(campaign: xr.Dataset) -> Iterator[tuple[str, str, str, Any, Array, Array]]:
+    """Of each limit of the scene its path, the output that it bounds and its series, what it
+    allows, the largest values and the margins of all samples.
+    """
+    scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
+    own = by_path(campaign)
+    for limit, peak, series in _limited():
+        path = f"limits.{limit}"
+        if peak not in campaign or (path not in scene and path not in own):
+            continue
+        allowed = numbers(campaign, own[path]) if path in own else float(scene[path])
+        values = _largest(campaign, peak, series)
+        loaded = np.where(good(campaign) & (values > 0.0), values, np.nan)
+        ratio = np.asarray(allowed / loaded - 1.0)
+        if np.isfinite(ratio).any():
+            yield path, peak, series, allowed, values, ratio
 
 
 def _limited() -> Iterator[tuple[str, str, str]]:

@@ -144,6 +144,10 @@ def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool
     return False
 
 
+_ANEW = "requirements, outputs, checks or number of samples changed"
+"""What a file that is called again may have otherwise."""
+
+
 def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str) -> None:
     wanted = campaign.specification
     model = Fidelity[wanted.fidelity.upper()]
@@ -155,6 +159,12 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
         "design": wanted.design.model_dump_json(), "requirements": to_json(wanted.requirements),
         "modules": extensions.digest(campaign.scene.imports),
     }  # fmt: skip
+    if (path / DESIGN).is_file():  # the same samples, otherwise judged, or more of them
+        before = read_design(path)[1]
+        attributes |= {name: before[name] for name in ("history", "date_created")}
+        if before["campaign"] != campaign.text:
+            changed = made["history"].replace("designed", _ANEW)
+            attributes["history"] = f"{changed}\n{before['history']}"
     if wanted.outputs:
         attributes["outputs"] = derived.to_json(wanted.outputs)
     if wanted.rule is not None:

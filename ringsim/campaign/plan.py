@@ -229,11 +229,13 @@ def _confounded(table: Table, kind: str) -> list[str]:
     """A line if inputs go together, as points of a design do that are few for its dimensions."""
     found: dict[bytes, tuple[str, Array]] = {}
     for column in table.columns:
-        if column.path and column.values.dtype.kind in "iuf":
+        follows = '"kind":"function"' in column.origin  # as its leader does: no input of its own
+        if (column.path or column.input) and not follows and column.values.dtype.kind in "iuf":
             values = column.values.reshape(table.samples, -1).astype(float)
             for k, each in enumerate(values.T):
                 place = show(column.places[k]) if column.places else k + 1
-                name = f"{column.path}[{place}]" if column.dim else column.path
+                called = column.path or column.input
+                name = f"{called}[{place}]" if column.dim else called
                 found.setdefault(each.tobytes(), (name, each))  # paths that share their values
     names = [name for name, _ in found.values()]
     if len(names) < 2:

@@ -1,7 +1,6 @@
 """The verification dossier: what a campaign holds of what a review of a mechanism asks for.
 
-One subject is one function below, with ``@item`` for each clause that it answers; nothing else
-knows it.
+One subject is one function, with ``@item`` for each clause that it answers; nothing else knows it.
 """
 
 import re
@@ -16,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import LATE, MARK, NOTE, doubted, off_note
+from ringsim.analysis import campaign_notes as notes
 from ringsim.analysis.design import REACHED, by_path, learnt_lines
 from ringsim.analysis.engines import differences, verdict
 from ringsim.analysis.influence_text import what_matters
-from ringsim.analysis.intervals import CHECKED, good, numbers, quantities
+from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.study import SOURCES, analyse
 from ringsim.analysis.study_text import (
@@ -137,7 +136,7 @@ def dossier(campaign: xr.Dataset, analysis: xr.Dataset | None = None) -> list[Ta
     analysis = analyse(campaign) if analysis is None else analysis
     scene = flat(tomllib.loads(str(campaign.attrs["scene"])))
     told = statistics_table(analysis, every=True), error_tables(analysis, every=True)
-    of = Of(campaign, analysis, scene, *told, MARK * bool(analysis.attrs[NOTE]))
+    of = Of(campaign, analysis, scene, *told, notes.MARK * bool(analysis.attrs[notes.NOTE]))
     found = list[Table]()
     for standard, known in KNOWN.items():
         own = sorted((e for e in ITEMS if e.standard == standard), key=lambda each: each.place)
@@ -151,7 +150,7 @@ def dossier(campaign: xr.Dataset, analysis: xr.Dataset | None = None) -> list[Ta
             )
             for each, told in rows
         ], [known], left=len(HEAD), title=standard)  # fmt: skip
-        found.append(doubted(table, analysis.attrs, off_note(analysis.attrs)))
+        found.append(notes.doubted(table, analysis.attrs, notes.off_note(analysis.attrs)))
     return found
 
 
@@ -204,7 +203,9 @@ def write_dossier(campaign: xr.Dataset, out: Path, folder: str) -> tuple[int, li
 def _cells(tables: Iterable[Table], name: str) -> dict[str, str]:
     """The cells of an output in tables, by the heads of their columns; empty without a row."""
     rows = ((each.head, row) for each in tables for row in each.rows)
-    own = (dict(zip(*each, strict=True)) for each in rows if each[1][0] in (name, name + MARK))
+    own = (
+        dict(zip(*each, strict=True)) for each in rows if each[1][0] in (name, name + notes.MARK)
+    )
     return next(own, {})
 
 
@@ -321,8 +322,10 @@ def _temperature(of: Of) -> Answer:
             known = f"{path.removesuffix('.temperatures')} for {values[0]:g} to {values[-1]:g} K"
             found.evidence.append(f"the scene has {known}")
     if not found.result:
-        cure = "draw temperature.joint.value or temperature.pulley.value under [inputs]"
-        found.lacks["scatter of temperatures"] = cure
+        cure = "draw temperature.joint.value, temperature.pulley.value or an input of unit K"
+        return found + Answer(lacks={"scatter of temperatures": cure})
+    found.result += _ends(of)
+    found.lacks["gradients"] = "parts of one kind have one temperature: other cases by [set]"
     return found
 
 
@@ -331,10 +334,10 @@ _ALLOWABLES = {"peak_tension": "limits.tension", "peak_rod_stress": "limits.rod_
 
 @item(ECSS, "4.7.5.2.5, 4.8.2.4 Margin of safety", "Allowable / (worst load x factor) - 1 > 0.")
 def _strength(of: Of) -> Answer:
-    found, margins = Answer(), margin_table(of.analysis).rows
+    found, margins = outputs(**dict.fromkeys(_ALLOWABLES, ""))(of), margin_table(of.analysis).rows
     for name, limit in _ALLOWABLES.items():
         own = [row for row in margins if row[0].startswith(limit)]
-        found += outputs(**{name: ""})(of) + _verdicts(of, name)
+        found += _verdicts(of, name)
         for told, of_what, worst, margin, sample, beyond in own:
             worst += f" in sample {sample}; beyond it {beyond}"
             found.result.append(f"{told}: margin {margin}, of {of_what} {worst}")
@@ -366,7 +369,7 @@ def _drive(of: Of) -> Answer:
     found.result += [
         f"in sample {sample} it is least at {angle:.3g} deg, {time:.3g} s",
         f"below 0 in {short} of {int(held.sum())} samples" + ": NOT enough" * bool(short),
-        *filter(None, [of.analysis.attrs.get(LATE)]),
+        *filter(None, [of.analysis.attrs.get(notes.LATE)]),
     ]
     factors = ", ".join(
         f"{path.removeprefix('margin.').replace('_', ' ')} {show(value)}"
@@ -397,14 +400,12 @@ def _cases(of: Of) -> Answer:
     if kind in ("grid", "list", "one-at-a-time"):
         found.result.append(f"cases are chosen: design {kind}")
     else:
-        cure = f'design {kind} meets them by chance; kind = "grid" or "list" places them'
-        found.lacks[_EXTREMES] = cure
+        found.lacks[_EXTREMES] = f'design {kind} meets them by chance; "grid" or "list" places them'
     ground = [f"{path} = {show(value)}" for path, value in of.scene.items()
               if path.startswith(("gravity.", "offload."))]  # fmt: skip
     found.result.append(", ".join(ground) or "in orbit: no gravity, no lines of a test rig")
     if not ground:
-        cure = "the same seed with gravity and offload, then ringsim compare"
-        found.lacks["the ground"] = cure
+        found.lacks["the ground"] = "the same seed with gravity and offload, then ringsim compare"
     return found
 
 
@@ -425,8 +426,7 @@ def _tolerances(of: Of) -> Answer:
     own = _drawn(of, lambda path, unit: path.startswith(_LENGTHS) and unit in ("m", ""))
     if own:
         return Answer(own) + outputs(best_fit_rms="record.shape = true")(of)
-    cure = "draw rods.length_error or structure.hinge_error under [inputs]"
-    return Answer(lacks={"scatter of lengths": cure})
+    return Answer(lacks={"scatter of lengths": "draw rods.length_error or structure.hinge_error"})
 
 
 @item(ECSS, "4.8.2.6.3 a Conformance", "Each requirement is kept, with parameters at their worst.")
@@ -453,7 +453,9 @@ def _faults(of: Of) -> Answer:
 def _integrity(of: Of) -> Answer:
     rows = [row for each in of.errors for row in each.rows if "median" in each.head]
     found = Answer([f"{name}: median {median}, largest {most}" for name, median, most, _ in rows])
-    found.evidence += sorted({f"{row[-1]} samples" for row in rows})
+    found.evidence += sorted({f"{row[-1]} samples" for row in rows}) + notes.remark_lines(
+        of.campaign
+    )
     return found if rows else Answer(lacks={"energy balance": "no sample has a valid result"})
 
 
@@ -532,22 +534,30 @@ def _pedigree(of: Of) -> Answer:
     return found
 
 
+_UNMEASURED = "numerical errors not measured"
+
+
 @item(NASA, "factor 4, results uncertainty (second-hand)", "How uncertain the results are.")
 def _uncertainty(of: Of) -> Answer:
     found, says = Answer(), of.analysis.attrs
     ends = [of.analysis[f"{n}_interval"].values for n in quantities() if n in of.analysis]
     if np.isfinite(ends).any():
-        found.result += [says["intervals"], *filter(None, [says[NOTE], says["stopping"]])]
+        found.result += [says["intervals"], *filter(None, [says[notes.NOTE], says["stopping"]])]
     else:
         found.lacks["intervals"] = says["intervals"] or "more samples"
     found.evidence.append(f"{says['samples_run']} of {says['samples']} samples have run")
     largest = dict[str, list[str]]()
     for name in quantities():
-        if source := _cells(of.errors, name).get("dominates", "-").partition(" ")[0].strip("-"):
-            largest.setdefault(source, []).append(name)
+        cell = _cells(of.errors, name)
+        if source := cell.get("dominates", "-").partition(" ")[0].strip("-"):
+            bare = cell["numerical (error bars)"] == "-" and not is_moment(name)
+            if not is_moment(name):
+                largest.setdefault(_UNMEASURED if bare else source, []).append(name)
     for source, names in largest.items():
-        told = counted(len(names), "output") if source == SOURCES[0] else ", ".join(names)
-        found.evidence.append(f"largest part of the error of the mean is {source}: {told}")
+        many = source in (SOURCES[0], _UNMEASURED)
+        told = counted(len(names), "output") if many else ", ".join(names)
+        part = f"largest part of the error of the mean is {source}"
+        found.evidence.append(f"{source if source == _UNMEASURED else part}: {told}")
     return found
 
 

@@ -179,7 +179,11 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
             origin = "inferred"
         elif text and path not in written:
             origin = "default"
-        rows.append(Value(path, show(value), origin, comment or _remark(path, own)))
+        told = show(value)
+        if path == BARS and BARS in settings and "solver_error_bars" in campaign:
+            barred = campaign["solver_error_bars"]
+            told = f"true in {int(barred.sum())} of {barred.size} samples (error_bars_every)"
+        rows.append(Value(path, told, origin, comment or _remark(path, own)))
     known = [row.path for row in rows]
     unset = [path for path in drawn if not _under(path, known) and not _holds(path, known)]
     rows += [Value(path, "-", "drawn", "") for path in unset]

@@ -571,6 +571,10 @@ def law_text(says: Mapping[str, Any]) -> str:
             f"after {own.get('data') or 'a test'} (before: {law_text(own['of'])})"
         )
     kind = str(own.pop("kind", own.pop("text", "")))
+    if kind == "function":
+        pairs = (f"{y:g} at {x}" if isinstance(x, str) else f"{y:g} at {x:g}"
+                 for x, y in own["table"])  # fmt: skip
+        return f"follows {own['input']}: {', '.join(pairs)}"
 
     def told(value: Any) -> str:
         if isinstance(value, Mapping):

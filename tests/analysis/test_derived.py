@@ -233,6 +233,8 @@ def test_texts_of_chance_are_refused_or_computed_and_never_run() -> None:
     ]  # fmt: skip
     arrays, axes = stored()
     watched, lines = False, list[str]()
+    # xarray imports dask, where that is installed, when it is first used.
+    over_samples({"x": Derived(of="locked_joints")}, arrays, axes)
     for _ in range(2_000):
         text = "".join(stream.choice([*words, stream.choice(string.printable)])
                        for _ in range(stream.randrange(1, 12)))  # fmt: skip
@@ -295,6 +297,10 @@ apart = "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
     monkeypatch.setattr(netcdf, "CHUNK_BYTES", 1)
     assert "3 of 3" in call("campaign", "own.toml", "--workers=0")
     again = xr.load_dataset("runs/own/campaign.nc")
+    *_, changed, designed = again.attrs["history"].splitlines()
+    assert designed == found.attrs["history"].splitlines()[-1]
+    assert "designed by" in designed
+    assert "number of samples changed by" in changed
     np.testing.assert_array_equal(again["wall_time"], found["wall_time"])
     least = found["cable_tension"].sel(plane="upper").min(["span", "time"])
     np.testing.assert_array_equal(again["pull"], least)

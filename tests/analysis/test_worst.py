@@ -17,10 +17,11 @@ from ringsim.analysis.intervals import quantities, worst_sample
 from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import statistics_table, told, verdict_lines
-from ringsim.analysis.worst import margin_table
+from ringsim.analysis.worst import margin_table, worst_tables
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
+from ringsim.variables import Fate
 
 pytestmark = pytest.mark.quick
 
@@ -80,6 +81,27 @@ def test_margins_to_limits_are_those_of_the_worst_sample_at_any_time() -> None:
     assert row == ("limits.tension = 30 N", later, "29 N", "+0.0345", "2", "0 of 7")
     assert "limits.tension = 30 N" in "\n".join(verdict_lines(made))
     assert not margin_table(analyse(made_campaign(8))).rows
+
+
+def test_overloaded_antennas_are_ordered_by_their_load_and_tell_it() -> None:
+    """And those that deploy all the same have not ended before that."""
+    made = with_limits(made_campaign(8), tension=23.5)
+    over = made["peak_tension"].values > 23.5  # 24 .. 27 N
+    made["outcome"] = "sample", np.where(over, int(Fate.OVERLOADED), made["outcome"].values)
+    made["reason"] = "sample", np.array([
+        f"all V-joints have reached 180 deg; {20 + k} N at 5 s, more than limits.tension = 23.5 N"
+        for k in range(8)
+    ], dtype=object)  # fmt: skip
+    wanted = {"asynchrony_max": {"max": 90.0, **BOUND}}
+    found = analyse(made, wanted)
+    (table,) = (each for each in worst_tables(found, "f") if each.title.startswith("overloaded"))
+    assert [row[:2] for row in table.rows] == [
+        (str(k), f"{20 + k} N at 5 s, more than limits.tension = 23.5 N") for k in (7, 6, 5)
+    ]
+    assert not any("ended before" in line for line in told(found))
+    made["deployment_time"][7] = np.nan
+    assert any("1 of the 8 samples that meet it ended before" in line
+               for line in told(analyse(made, wanted)))  # fmt: skip
 
 
 def test_ropes_that_never_were_slack_count_as_within_the_limit() -> None:

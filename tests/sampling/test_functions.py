@@ -69,6 +69,7 @@ def test_they_are_their_tables_of_what_was_drawn(tmp_path: Path) -> None:
     plan = given.plan(out=tmp_path / "p")
     assert "cables.lower.axial_stiffness: " in plan
     assert "N, follows temperature" in plan
+    assert "rank correlation" not in plan  # both stiffnesses follow temperature, as they should
     told = ringsim.analyse(found)
     with pytest.raises(InputError, match="follows another input"):
         ringsim.analyse(found, reweighted={"temperature": INPUTS["cables.lower.axial_stiffness"]})

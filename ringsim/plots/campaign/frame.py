@@ -103,6 +103,10 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
         figure.supxlabel(words, x=0.012, ha="left", fontsize=9, color=style.GREY)
 
 
+_TOLD_APART = 12
+"""Letters of a name that is cut from which on it is that of one output."""
+
+
 def mark_panels(figure: Figure, names: Collection[str]) -> bool:
     """Mark panels and axes that are of outputs which may be off; whether there are any."""
     both = [(VARIABLES[n], VARIABLES.get(VARIABLES[n].largest_of or VARIABLES[n].least_of))
@@ -110,7 +114,13 @@ def mark_panels(figure: Figure, names: Collection[str]) -> bool:
     words = [each.long_name.lower() for pair in both for each in pair if each is not None]
     texts = [t for a in figure.axes for t in (a.title, a.xaxis.label, a.yaxis.label)]
     texts += [figure._supylabel] if figure._supylabel else []  # type: ignore[attr-defined]
-    found = [t for t in texts if any(w in " ".join(t.get_text().lower().split()) for w in words)]
+    found = []
+    for text in texts:
+        told = " ".join(text.get_text().lower().split())
+        begun = told.partition("...")[0].strip() if "..." in told else ""  # words that are cut
+        cut = len(begun) >= _TOLD_APART and any(w.startswith(begun) for w in words)
+        if cut or any(w in told for w in words) or told.split(" ")[0] in names:
+            found.append(text)
     for text in found:
         text.set_text(f"{text.get_text()}{DOUBT}")
     return bool(found)
