@@ -4,7 +4,7 @@ import functools
 import importlib
 import pkgutil
 from dataclasses import dataclass
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, Union, get_args
 
 from pydantic import Field, GetCoreSchemaHandler, TypeAdapter
 from pydantic_core import CoreSchema, core_schema
@@ -37,10 +37,16 @@ class OneOf:
 
 
 def kinds_of(family: type[Model]) -> dict[str, type[Model]]:
-    """All kinds of a family by name."""
+    """All kinds of a family by name; ValueError if two have one name, or one has no usable name."""
     found: dict[str, type[Model]] = {}
     for kind in leaves_of(family):
-        word = str(kind.model_fields["kind"].default)
+        field = kind.model_fields["kind"]
+        word = str(field.default)
+        if get_args(field.annotation) != (word,):
+            raise ValueError(
+                f"kind {word} of {kind.__module__}.{kind.__name__} is not a Literal of this word: "
+                f'write kind: Literal["{word}"] = "{word}"'
+            )
         if (other := found.setdefault(word, kind)) is not kind:
             raise ValueError(
                 f"kind {word} is defined twice, in {other.__module__} and in {kind.__module__}: "

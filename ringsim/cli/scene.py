@@ -510,6 +510,11 @@ def explain_command(names: tuple[str, ...], schema: str | None, imports: tuple[s
     if schema is not None:
         _print_schema(schema, names)
         return
+    if imports:
+        from ringsim.reference.tree import ROOTS, schema_of
+
+        for root in ROOTS:  # refuses records that no file could choose
+            schema_of(root)
     known = COORDINATES | {SPAN_NAME.name: SPAN_NAME} | VARIABLES
     # Paths are looked up before anything is printed, so that one that is refused stands alone.
     told = [explained(known[name]) if name in known else _key(name, known) for name in names]

@@ -262,11 +262,14 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 def schema_of(kind: str) -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of the files of a kind, "scene" or "campaign".
 
-    InputError if there is no such kind.
+    InputError if there is no such kind, or if a record of the user's cannot be a choice.
     """
     if kind not in ROOTS:
         raise InputError(f"--schema {kind}: must be {known_or_nearest(kind, ROOTS)}")
-    made = ROOTS[kind].model_json_schema(schema_generator=_Schema)
+    try:
+        made = ROOTS[kind].model_json_schema(schema_generator=_Schema)
+    except ValueError as error:
+        raise InputError(str(error)) from None
     inputs = made["properties"].get("inputs")
     if inputs is not None:  # paths may be tables of tables: [inputs.rods] young_modulus = {...}
         one = inputs["additionalProperties"]

@@ -229,6 +229,44 @@ def test_own_kinds_are_explained(tmp_path: Path) -> None:
     assert refused.exit_code == EXIT_BAD_INPUT
 
 
+SPRING = """
+from typing import Literal
+
+from ringsim.parts.joints import HingeSpring
+
+
+class {name}(HingeSpring):
+    kind: {form} = "{word}"
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "word", "told"),
+    [
+        ("AnotherTape", 'Literal["tape"]', "tape", "kind tape is defined twice"),
+        ("NoLiteral", "str", "no-literal", 'write kind: Literal["no-literal"] = "no-literal"'),
+        ("Misspelt", 'Literal["tape"]', "tpae", 'write kind: Literal["tpae"] = "tpae"'),
+    ],
+)
+def test_kinds_that_no_scene_could_choose_are_refused(
+    name: str, form: str, word: str, told: str, tmp_path: Path
+) -> None:
+    """Before anything is explained."""
+    file = tmp_path / "springs_here.py"
+    file.write_text(SPRING.format(name=name, form=form, word=word), encoding="utf-8")
+    scene = load_scene("ring18").to_toml().replace("imports = []", 'imports = ["springs_here"]')
+    (tmp_path / "scene.toml").write_text(f'{scene}\n[hinge_spring]\nkind = "{word}"\n', "utf-8")
+    for arguments in (
+        ("check", f"{tmp_path / 'scene.toml'}"),
+        ("explain", "hinge_spring", f"--import={file}"),
+        ("explain", "--schema=scene", f"--import={file}"),
+    ):
+        refused = ringsim(*arguments)
+        assert refused.returncode == EXIT_BAD_INPUT, refused.stderr
+        assert told in refused.stderr
+        assert refused.stderr.count("\n") == 1
+
+
 def test_an_entry_point_names_a_module_of_a_package(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
