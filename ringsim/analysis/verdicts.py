@@ -341,9 +341,9 @@ def _ended_short(campaign: xr.Dataset) -> Mask:
     """
     if OUTCOME not in campaign:
         return np.zeros(campaign.sizes["sample"], dtype=bool)
-    short = ~np.isin(campaign[OUTCOME].to_numpy(), [-1, Fate.NONE, *GOALS])
-    opened = campaign[OUTCOME].to_numpy() == Fate.OVERLOADED
-    return short & ~(opened & np.isfinite(numbers(campaign, "deployment_time")))
+    fate = campaign[OUTCOME].to_numpy()
+    opened = (fate == Fate.OVERLOADED) & np.isfinite(numbers(campaign, "deployment_time"))
+    return np.asarray(~np.isin(fate, [-1, Fate.NONE, *GOALS]) & ~opened)
 
 
 def verdict_of(low: float, high: float, probability: float) -> Verdict:
