@@ -175,8 +175,8 @@ def _cut_off(found: xr.Dataset) -> Iterator[str]:
         if count:
             samples = f"{count} of {counted(found.attrs[f'{side}_samples'], 'sample')}"
             yield (
-                f"{name}: solver.end_time cut off {samples}: what grows with time counts with what "
-                "it was by then, so that it is at least as large"
+                f"{name}: {samples} cut off at solver.end_time: their largest values may have "
+                "grown later, and are lower bounds"
             )
 
 

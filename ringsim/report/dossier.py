@@ -530,7 +530,7 @@ def _pedigree(of: Of) -> Answer:
     else:
         found.lacks["inputs that a test has told"] = 'ringsim calibrate, then from = "posterior.nc"'
     if not counts["inferred"] + counts["default"]:
-        found.lacks["which values are assumed"] = "no scene file of one's own tells: list them"
+        found.lacks["which values are assumed"] = "a file of one's own does not tell: list them"
     return found
 
 

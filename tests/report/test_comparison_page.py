@@ -207,7 +207,7 @@ def test_samples_that_were_cut_off_are_told_and_what_differs_comes_first(
 ) -> None:
     one = both[0].copy(deep=True)
     one["outcome"][:2] = int(Fate.CUT_OFF)
-    told = "ground: solver.end_time cut off 2 of 8 samples: "
+    told = "ground: 2 of 8 samples cut off at solver.end_time: "
     text = comparison_page(compare(one, both[1], ("ground", "flight")), one, both[1])
     assert told in text
     assert text.index("<h1>") < text.index('id="settings"') < text.index('id="requirements"')

@@ -263,9 +263,7 @@ def tornado(campaign: xr.Dataset) -> Figure:
     beyond = any(np.isfinite(bars.chance) for _, bars in found)
     of = f"The longest {_MOST} bars at most{', significant inputs only' * beyond}."
     if any((np.abs(bars.values) < bars.chance).any() for _, bars in found):
-        of += (
-            " Where an index ends before the dashed line, the correlation below it is significant."
-        )
+        of += " An index that ends before the dashed line is drawn for the correlation below it."
     each = f"{shared[0].upper()}{shared[1:]} in each panel." if shared else ""
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", each, whiskers, of]))
     if quiet:
