@@ -393,6 +393,10 @@ def what_matters(analysis: xr.Dataset) -> Table:
         notes.append(
             f"not listed, because samples differ by less than {100 * ALIKE:g} %: {', '.join(flat)}"
         )
+    asked = analysis["requirement"].values.tolist() if "requirement" in analysis.dims else []
+    if near := [name for name in asked if np.isfinite(analysis.get(f"{name}_same_within", np.nan))]:
+        told = ", ".join(near)
+        notes.append(f"not told, because samples differ by less than their numerical error: {told}")
     if quiet:
         notes.append(f"no significant input for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]

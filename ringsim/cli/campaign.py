@@ -185,6 +185,9 @@ def replay_command(
     faulthandler.enable()
     if told := other_build(campaign):
         click.echo(told)
+    for column in campaign.table.columns:
+        if column.input and not column.path:  # what others follow
+            click.echo(f"{column.input} = {_rounded(column.values[sample].item())}")
     for path, value in values.items():
         click.echo(f"{path} = {_rounded(value)}")
     result = solve(load_solver(solver), campaign.scene, number, values)

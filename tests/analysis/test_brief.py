@@ -130,6 +130,8 @@ def test_what_differs_by_less_than_its_numerical_error_is_one_value():
     (budget, *_) = error_tables(required)
     assert "peak_tension" in [each[0] for each in budget.rows]
     assert budget.notes[-2:] == [OF_ERRORS, "engines not measured"]
+    less = "not told, because samples differ by less than their numerical error: peak_tension"
+    assert less in what_matters(required).notes
     assert "peak_tension" not in one.output.values
     assert "peak_tension_rank_correlation" not in one
     # Half of that error is less than what is seen, and a single sample may be enough.

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import preloaded
 import pytest
 
 import ringsim
@@ -55,6 +56,9 @@ def test_they_are_their_tables_of_what_was_drawn(tmp_path: Path) -> None:
     })  # fmt: skip
     own = ringsim.simulate(scene, fidelity="frame")
     assert own["peak_tension"].item() == found["peak_tension"].values[5]
+    replayed = preloaded.ringsim("replay", tmp_path / "o", 5).stdout
+    assert f"temperature = {cold[5]:.6g}\n" in replayed
+    assert f'lot = "{lot[5]}"' in replayed
     values = {each.path: each for each in page.values_of(found)[0]}
     assert (values["joints.vjoint.viscous"].origin, values["joints.vjoint.viscous"].comment) == (
         "drawn", "follows lot",
