@@ -17,10 +17,10 @@ from ringsim.analysis.intervals import (
     good,
     is_moment,
     numbers,
+    of_both_engines,
     quantities,
 )
 from ringsim.analysis.ladder import Rung, references
-from ringsim.outputs import family
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.tables import counted, readable, text_table, unit_text, with_unit
 from ringsim.variables import GOALS, Fate, Outcome, Status
@@ -70,7 +70,7 @@ def differences(campaign: xr.Dataset) -> list[Difference]:
     ok = good(campaign)
     both = np.flatnonzero(ok & (campaign[f"status{CHECKED}"].to_numpy() == Status.OK))
     stand, placed, found = population_of(campaign), placement(campaign), []
-    same = {each.name for output in family.OUTPUTS if output.of_both for each in output.variables}
+    same = of_both_engines()
     for name, variable in quantities().items():
         if (
             name in same

@@ -446,6 +446,11 @@ def quantities() -> dict[str, Variable]:
     }  # fmt: skip
 
 
+def of_both_engines() -> set[str]:
+    """Outputs that both engines compute by the same code, so that neither judges the other."""
+    return {each.name for output in OUTPUTS if output.of_both for each in output.variables}
+
+
 def is_moment(output: str) -> bool:
     """Whether it is when a peak was: what it depends on is told at length alone."""
     known = quantities().get(output)

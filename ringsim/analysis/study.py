@@ -35,6 +35,7 @@ from ringsim.analysis.intervals import (
     good,
     lost,
     numbers,
+    of_both_engines,
     quantities,
     ran,
     same_within,
@@ -293,7 +294,8 @@ def _errors(
     values, index = numbers(campaign, name), campaign["sample"].to_numpy()
     sampling = placed.error_of_mean(values[known], index[known])
     apart = np.full(len(values), np.nan)
-    if f"status{CHECKED}" in campaign and f"{name}{CHECKED}" in campaign:
+    checked = f"status{CHECKED}" in campaign and f"{name}{CHECKED}" in campaign
+    if checked and name not in of_both_engines():
         both = campaign[f"status{CHECKED}"].to_numpy() == Status.OK
         apart = np.where(both, np.abs(values - numbers(campaign, f"{name}{CHECKED}")), np.nan)
     return np.array([

@@ -326,8 +326,9 @@ def _failures(
         known = value and None in (wanted.max, wanted.min)
         found.append(_Failure(words, own, badness, value, wanted.min is None if known else None))
     ends, came = endings(campaign), -numbers(campaign, "final_time")
-    ratios = [ratio for *_, ratio in _ratios(campaign)]
-    over = -np.fmin.reduce(ratios) if ratios else stuck
+    over = stuck
+    if (ends == Fate.OVERLOADED.word).any():  # reads all series
+        over = -np.fmin.reduce([ratio for *_, ratio in _ratios(campaign)] or [-stuck])
     found += [
         _Failure(word, ends == word, over if word == Fate.OVERLOADED.word else stuck, "")
         for word in short_of_goal(ends)

@@ -275,6 +275,24 @@ def test_rates_of_latches_by_section_and_antennas_without_cables_are_told() -> N
 
 
 @pytest.mark.quick
+def test_temperatures_are_told_with_what_became_of_the_antennas_and_remarks_of_runs_too() -> None:
+    campaign = made_campaign(4)
+    law = json.dumps({"kind": "uniform", "low": 210.0, "high": 310.0})
+    says = {"role": "input", "path": "", "input": "cold", "units": "K", "distribution": law}
+    campaign["cold"] = "sample", np.array([220.0, 250.0, 280.0, 300.0]), says
+    campaign["reason"] = "sample", np.array(["all open; friction is smoothed"] * 4, dtype=object)
+    own = row(rows_of(campaign), "Thermal design")
+    assert own["state"] == "in part"
+    assert "drawn: 220 to 300 K" in own["result"]
+    assert "deployed: 4 of 4" in own["result"]
+    assert "Missing: gradients" in own["result"]
+    evidence = row(rows_of(campaign), "Integrity check")["evidence"]
+    assert "in all 4 samples, for example in sample 0: friction is smoothed" in evidence
+    told = row(rows_of(campaign, NASA), "results uncertainty (second-hand)")["evidence"]
+    assert "largest part of the error of the mean" not in told  # nothing but sampling is known
+
+
+@pytest.mark.quick
 def test_every_key_of_a_cure_exists() -> None:
     known = {*tree.paths("scene"), *tree.paths("campaign")}
     text = "\n".join(
