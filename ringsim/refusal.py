@@ -83,7 +83,11 @@ def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
     faults.sort(key=lambda fault: fault["type"] != "extra_forbidden")
     line = f"{source}: {_describe(faults[0], model)}"
     groups: dict[str, list[str]] = {"also missing": [], "also at fault": []}
+    # What asks for a name that is refused is not at fault itself, as a requirement on an output.
+    cause = re.match(r"Value error, (\w+)[:. ]", faults[0]["msg"])
     for fault in faults[1:]:
+        if cause and fault["msg"].startswith(f"Value error, {cause[1]} is not "):
+            continue
         place, absent = _place(fault, model), fault["type"] == "missing"
         meant = line.endswith(f"(did you mean {place.rpartition('.')[2]}?)")
         own = groups["also missing" if absent else "also at fault"]
@@ -115,9 +119,9 @@ def known_or_nearest(key: str, known: Iterable[str]) -> str:
     return f"known: {', '.join(names[:_MOST_KNOWN] if more else names)}{more}"
 
 
-def show(value: Any) -> str:
-    """A value as TOML would write it, shortened."""
-    return shorten(_toml(value))
+def show(value: Any, most: int = LONGEST_VALUE) -> str:
+    """A value as TOML would write it, shortened to so many characters."""
+    return shorten(_toml(value), most)
 
 
 def _few_digits(value: Any) -> Any:
@@ -127,10 +131,16 @@ def _few_digits(value: Any) -> Any:
     return value
 
 
-def shorten(text: str) -> str:
-    """A text on one line, and cut where it is longer than a reader wants of a refused value."""
+def shorten(text: str, most: int = LONGEST_VALUE) -> str:
+    """A text on one line, and cut where it is longer than a reader wants of a refused value; a list
+    behind one of its values.
+    """
     text = " ".join(text.split())
-    return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
+    if len(text) <= most:
+        return text
+    cut = text[: most - 3]
+    whole = cut.rpartition(", ")[0] if cut.startswith(("[", "{")) else ""
+    return f"{whole}, ..." if whole else f"{cut}..."
 
 
 def _place(fault: Any, model: type[BaseModel]) -> str:
@@ -199,7 +209,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         return f"{line}; {value:g} mm are {1e-3 * value:g} m"
     if unit == " Pa" and number and 0.0 < value < limits.get("ge", 0.0):
         return f"{line}; {value:g} GPa are {1e9 * value:g} Pa"
-    if number and 1.0 < value <= 100.0 and limits.get("lt", limits.get("le")) == 1.0:
+    share = number and 1.0 < value <= 100.0 and limits.get("lt", limits.get("le")) == 1.0
+    if share and float(f"{value:.3g}") == value:  # nobody writes 1.0827989 per cent
         return f"{line}; {value:g} % are {value / 100.0:g}"
     if not isinstance(value, str):
         return line

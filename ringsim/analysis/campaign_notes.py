@@ -123,6 +123,18 @@ _LATE = re.compile(
 )
 
 
+def margins_once_on(campaign: xr.Dataset) -> NDArray[np.float64]:
+    """Least drive margins from the start of the last winch on, shape (samples,), where the least
+    of all is that of a time before; NaN elsewhere.
+    """
+    found = np.full(campaign.sizes["sample"], np.nan)
+    for sample in np.flatnonzero(good(campaign)).tolist() if "reason" in campaign else ():
+        for remark in str(campaign["reason"].values[sample]).split("; ")[1:]:
+            if (late := _LATE.match(remark)) and late[2]:
+                found[sample] = float(late[2])
+    return found
+
+
 def late_line(campaign: xr.Dataset) -> str:
     """In how many samples the least drive margin is that of a time before a winch starts, and the
     least of all samples from that start on; empty if in none.

@@ -252,7 +252,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
     missing in the other, and in the difference. The pairs whose outcome differs along ``change``;
     shares of outcomes along ``kind`` and of samples that meet a requirement along ``requirement``,
     see ``differences_of_shares``, and the verdicts on those whose limits differ as lines in the
-    attribute ``moved``; the margins to equal limits of both along ``limit``; the scenes' values
+    attribute ``moved``; the margins of both to their limits along ``limit``; the scenes' values
     that differ along ``setting``, by path.  Samples are those of ``samples_of``, as far as
     ``analyse`` counts them; means and shares are those of populations, and of pairs of grids and
     lists. ``pairing`` among the attributes says what is paired; ``names`` are what tables and
@@ -321,17 +321,22 @@ def _doubtful(both: Both) -> dict[str, Any]:
 
 
 def _limits(both: Both) -> dict[str, Any]:
-    """The worst value and the margin of both sides to every limit that is the same in both, see
-    ``worst.margins``; no variables without any.
+    """The worst value of both sides and the margin of each to its own limit, for limits that both
+    have, see ``worst.margins``; no variables without any.
     """
     known = [margins(each if "sample" in each.dims else each.expand_dims(sample=[0]))
              for each in both]  # fmt: skip
     if not all("limit" in each.dims for each in known):
         return {}
-    sides = [each.set_index(limit="limit_text") for each in known]
-    same = [text for text in sides[0]["limit"].values if text in sides[1]["limit"].values]
-    one, other = (each.sel(limit=same) for each in sides)
-    found: dict[str, Any] = {"limit": ("limit", np.array(same, dtype=object))}
+    texts = [each["limit_text"].values.tolist() for each in known]
+    paths = [[text.partition(" = ")[0] for text in own] for own in texts]
+    shared = [path for path in paths[0] if path in paths[1]]
+    places = [[own.index(path) for path in shared] for own in paths]
+    one, other = (each.isel(limit=own) for each, own in zip(known, places, strict=True))
+    words = []
+    for first, second in zip(one["limit_text"].values, other["limit_text"].values, strict=True):
+        words.append(first if first == second else f"{first} and {second.partition(' = ')[2]}")
+    found: dict[str, Any] = {"limit": ("limit", np.array(words, dtype=object))}
     found["limit_output"] = "limit", one["limit_output"].values, one["limit_output"].attrs
     for name in ("limit_value", "limit_margin"):
         values = np.stack([one[name].values, other[name].values], axis=-1)

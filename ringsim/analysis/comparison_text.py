@@ -36,7 +36,8 @@ bad: it explains a quarter of the variance of ranks."""
 _OPPOSITE = -0.7
 """Rank correlation below which the worst of one are the best of the other: half of the variance."""
 _STILL = 0.01
-"""Standard deviation over the mean below which the order of samples is of no interest."""
+"""Standard deviation over the mean below which the rank correlations of the table are enough: the
+samples are hardly in any order."""
 _SHORT = 16
 """Letters of a name up to which it heads columns."""
 
@@ -134,12 +135,14 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
     if "inputs differ" in found.attrs["pairing"]:  # pairs of antennas that have nothing in common
         return
     turned, tend, apart = dict[str, float](), dict[str, float](), dict[str, float]()
+    still = list[str]()
     for name, variable in quantities().items():
         if variable.summary is None or f"{name}_rank_correlation" not in found:
             continue
         together = found[f"{name}_rank_correlation"].item()
         sizes = np.abs(found[f"{name}_mean"].values)
         if (found[f"{name}_spread"].values < _STILL * sizes).any():
+            still += [name] * (together < _LOW)
             continue
         pairs = int(found[f"{name}_samples"].values[0])
         if together < -float(largest_by_chance(pairs, np.zeros(()), 1)):
@@ -154,6 +157,11 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
         if some:
             named = ", ".join(f"{name} ({each:+.2f})" for name, each in some.items())
             yield f"the ranks of pairs {sense} (rank correlation): {named}"
+    if still:
+        yield (
+            f"the ranks of pairs say little of {', '.join(still)}: in one of the two the samples "
+            f"scatter by less than {100 * _STILL:g} % of their mean"
+        )
 
 
 def _other_verdicts(found: xr.Dataset) -> Iterator[str]:
@@ -252,7 +260,7 @@ def _moved(found: xr.Dataset) -> Table:
 
 
 def _limits(found: xr.Dataset) -> Table:
-    """The worst values of both and their margins to the limits that both have."""
+    """The worst values of both and their margins to limits, which may differ between the two."""
     rows, names = [], names_of(found)
     for text in found["limit"].values if "limit" in found.dims else ():
         one = found.sel(limit=text)

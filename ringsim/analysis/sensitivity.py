@@ -384,7 +384,7 @@ def changes(campaign: xr.Dataset, step: float = STEP) -> tuple[list[Change], dic
             both, own = (law, other), str(variable.name)
             found.append(Change(name, of + places, " -> ".join(told), own, both))
         if isinstance(law, Uniform):
-            left.setdefault("the mean: no samples beyond the bounds", []).append(name)
+            left.setdefault("means: no sample outside the bounds to weigh up", []).append(name)
         elif len(found) == count:
             left.setdefault("without a mean and a standard deviation of its own", []).append(name)
     return found, left

@@ -492,10 +492,12 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         "largest difference", "dominates",
     )  # fmt: skip
     notes = [OF_ERRORS] * any(any(c != "-" for c in (row[3], row[6])) for row in rows)
-    untold = {row[-1].partition(" (")[2].rstrip(")") for row in rows if row[-1] != "-"}
-    if len(untold) == 1 and (words := untold.pop()):  # once for all rows
-        rows = [(*row[:-1], row[-1].partition(" (")[0]) for row in rows]
-        notes.append(words)
+    untold = dict.fromkeys(row[-1].partition(" (")[2].rstrip(")") for row in rows if row[-1] != "-")
+    # What is not measured is told once: below all rows, or by stars that rows refer to.
+    stars = {words: "*" * k * (len(untold) > 1) for k, words in enumerate(filter(None, untold), 1)}
+    for words, star in stars.items():
+        rows = [(*row[:-1], row[-1].replace(f" ({words})", f" {star}".rstrip())) for row in rows]
+        notes.append(f"{star} {words}".lstrip())
     tables = [marked(Table(head, rows, notes), analysis)] if every else []
     if "balance" in analysis.dims:
         columns = (analysis[f"balance_{word}"].values.tolist()

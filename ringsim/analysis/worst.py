@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import LATE, doubted, marked
+from ringsim.analysis.campaign_notes import LATE, doubted, margins_once_on, marked
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -417,7 +417,7 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
     largest value, less 1), ``limit_value`` and ``limit_sample``; a limit holds for the whole run,
     so that values behind the last lock count, too: ``limit_of`` says so where one is larger than
     the peak, ``limit_output``.  Behind these the drive margin of scenes with one, which is one
-    already.  Empty without any.
+    already, and where it is least before a winch starts, that from then on.  Empty without any.
     """
     rows = list[tuple[str, str, str, float, float, int, int, int]]()
     for path, peak, series, allowed, values, ratio in _ratios(campaign):
@@ -435,6 +435,12 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         counts = int((least < 0.0).sum()), int(np.isfinite(least).sum())
         same = float(least[k])
         rows.append((f"{_DRIVE} >= 0", _DRIVE, _DRIVE, same, same, k, *counts))
+        started = np.where(np.isfinite(least), margins_once_on(campaign), np.nan)
+        if np.isfinite(started).any():
+            least = np.where(np.isfinite(started), started, least)
+            k, short = int(np.nanargmin(least)), int((least < 0.0).sum())
+            same, words = float(least[k]), f"{_DRIVE} >= 0 with all winches on"
+            rows.append((words, _DRIVE, _DRIVE, same, same, k, short, counts[1]))
     if not rows:
         return xr.Dataset()
     texts, names, told_of, margin, value, places, beyond, of_all = zip(*rows, strict=True)
@@ -509,6 +515,7 @@ def margin_table(analysis: xr.Dataset) -> Table:
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"
     ] * any(name != _DRIVE for _, name, *_ in rows)
-    notes += filter(None, [analysis.attrs.get(LATE)])
+    late = str(analysis.attrs.get(LATE, ""))
+    notes += filter(None, [late.partition(";")[0]])  # the rest is a row
     head = ("limit", "of", "worst value", "margin", "in sample", "samples beyond")
     return marked(Table(head, rows, notes, left=2), analysis, 2)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.analysis.design import placement_of
 from ringsim.analysis.influence import pairs
-from ringsim.analysis.intervals import samples_needed
+from ringsim.analysis.intervals import quantities, samples_needed
 from ringsim.analysis.requirements import Requirement
 from ringsim.campaign.folder import Folder, digests, opened_as
 from ringsim.campaign.run import Order, grown, growth_told
@@ -46,6 +46,7 @@ _FULL = 30.0
 """Time of the full engine over that of frames: 20 to 50 (docs/evidence/frame.md)."""
 _UNUSUAL = 5.0
 """Time of a sample that runs over that of others from which on both are told."""
+_BARS = "solver.error_bars"
 _STRONG = 0.5
 """Rank correlation of two inputs that is told before anything runs."""
 
@@ -93,6 +94,7 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
         lines.append(f"  statistics     {placed.told}")
     if placed.population and not campaign.specification.correlations:
         lines += _confounded(table, kind_of(design))
+    lines += _required(campaign.specification.requirements)
     if placed.population:
         lines += _out_of_reach(campaign.specification.requirements, table.samples)
     if rule := campaign.specification.rule:
@@ -206,9 +208,38 @@ def _predicted(
         size = float(len(result.body) + len(result.header()))
         basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
     each = per_cost * cost[todo]
-    ends = f"{each.min():.3g}", f"{each.max():.3g}"
-    spread = f" ({ends[0]} to {ends[1]} s)" if ends[0] != ends[1] else ""
+    barred = np.zeros(len(todo), dtype=bool)
+    for column in table.columns:
+        if column.path == _BARS and column.values.dtype.kind == "b":
+            barred = column.values[todo]
+    ends = _span(each[~barred] if not barred.all() else each)
+    if barred.any() and not barred.all():
+        ends += f"; with error bars {_span(each[barred])}"
+    spread = f" ({ends})" if each.min() < each.max() else ""
     return each, [f"{each.mean():.3g} s each{spread}, {basis}"], size
+
+
+def _span(seconds: Array) -> str:
+    ends = dict.fromkeys((f"{seconds.min():.3g}", f"{seconds.max():.3g}"))
+    return f"{' to '.join(ends)} s"
+
+
+def _required(requirements: Mapping[str, Requirement]) -> list[str]:
+    """A line a requirement; a bound on the side on which nothing is wrong is pointed out."""
+    lines, known = list[str](), quantities()
+    for name, wanted in requirements.items():
+        worse = known[name].worse if name in known else "neither"
+        bounds = [key for key, _ in wanted.limits]
+        doubt = {("larger", "min"): "max", ("smaller", "max"): "min"}
+        meant = doubt.get((worse, bounds[0])) if len(bounds) == 1 else None
+        doubtful = (
+            f" (doubtful: {worse} values are the worse ones: is {meant} meant?)" if meant else ""
+        )
+        lines.append(
+            f"  requirement    {wanted.told(name)} with probability {wanted.probability:g}, "
+            f"confidence {wanted.confidence:g}{doubtful}"
+        )
+    return lines
 
 
 def _out_of_reach(requirements: Mapping[str, Requirement], samples: int) -> list[str]:
@@ -262,7 +293,7 @@ def _confounded(table: Table, kind: str) -> list[str]:
 def extent_told(column: Column) -> str:
     """A line with the values of an input, or with the samples that have error bars."""
     values = column.values
-    if column.path == "solver.error_bars" and values.dtype.kind == "b":
+    if column.path == _BARS and values.dtype.kind == "b":
         barred = np.flatnonzero(values).tolist()
         shown = ", ".join(map(str, barred[:_MOST_SHOWN])) + ", ..." * (len(barred) > _MOST_SHOWN)
         return f"  error bars     samples {shown}"

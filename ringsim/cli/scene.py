@@ -457,7 +457,12 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
         yield "both planes are equal: each gives half of the drive"
         return
     both = DriveMargin(scene, standard)
+    winches = both.conditions.winches
     for number, plane in enumerate(scene.structure.planes):
+        own = [w for (cable, _), w in winches.items() if cable == number and turns_ever(w)]
+        if own and all(winch.start_time > both.conditions.begin for winch in own):
+            yield f"{plane} cable alone: its winch starts later, not included here"
+            continue
         least = PlaneMargin(both, number).least()
         whole = both.at(least.angle).available
         share = f"{100.0 * least.available / whole:.3g}" if whole > 0.0 else "0"

@@ -352,11 +352,15 @@ def _course(
         return found
 
     if dry_run:
+        from ringsim.sampling.distributions import law_text
 
         def first() -> tuple[Order, int, int]:
             found = given()
             if not planning:
                 found.require_readings()
+            for name, law in found.budget.clock:
+                if law is not None:
+                    click.echo(f"  clock.{name}: {law_text(law.model_dump(mode='json'))}")
             return Order(found.campaign, Path()), found.members * found.budget.stages, 0
 
         return _plan(first, workers)

@@ -57,6 +57,8 @@ _PLACES = re.compile(
 )
 """What differs between antennas that ended alike: V-joints by name, numbers, and plurals."""
 _MOST_NAMED = 20
+_LONGEST = 400
+"""Characters of a value of the scene that are shown: those of a list for 36 hinges."""
 """Samples of a row that are named."""
 Rows = list[list[str]]
 
@@ -179,7 +181,7 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
             origin = "inferred"
         elif text and path not in written:
             origin = "default"
-        told = show(value)
+        told = show(value, _LONGEST)
         if path == BARS and BARS in settings and "solver_error_bars" in campaign:
             barred = campaign["solver_error_bars"]
             told = f"true in {int(barred.sum())} of {barred.size} samples (error_bars_every)"

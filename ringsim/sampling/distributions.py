@@ -24,6 +24,8 @@ from ringsim.units import ListIn, Model
 Values = NDArray[Any]
 """Numbers, words, true and false; of dtype object where they are mixed, tables or lists."""
 
+_ICE = 273.15
+"""0 C in K."""
 _WORD = re.compile(r"(?!(true|false|inf|nan)$)[^\W\d_][\w .:/+-]*(?<! )")
 """Texts that need no quotes in a label: others might read as several values, or as a number."""
 
@@ -543,9 +545,15 @@ class Function(Distribution):
             return np.reshape(np.array(found, dtype=float), given.shape)
         low, high = float(keys[0]), float(keys[-1])
         if given.min() < low or given.max() > high:
+            ends = float(given.min()), float(given.max())
+            cure = "add rows, or truncate that input"
+            if low <= ends[0] + _ICE and ends[1] + _ICE <= high:
+                cure = (
+                    f"{ends[0]:g} to {ends[1]:g} C are {ends[0] + _ICE:g} to {ends[1] + _ICE:g} K"
+                )
             raise InputError(
-                f"inputs: {name}: {self.input} is drawn from {given.min():g} to {given.max():g}, "
-                f"and the table goes from {low:g} to {high:g}: add rows, or truncate that input"
+                f"inputs: {name}: {self.input} is drawn from {ends[0]:g} to {ends[1]:g}, and the "
+                f"table goes from {low:g} to {high:g}: {cure}"
             )
         return np.asarray(np.interp(given, np.array(keys, dtype=float), values))
 

@@ -285,6 +285,17 @@ def _named(base: Scene, paths: Sequence[str], error: InputError) -> str:
     return told
 
 
+def _from_table(table: Table, path: str, sample: int) -> str:
+    """Where a value comes from that follows another input: from a table, and for which value."""
+    for column in table.columns:
+        if column.path == path and '"kind":"function"' in column.origin:
+            leaders = (c for c in table.columns if c is not column and not c.dim)
+            lead = next((c for c in leaders if (c.input or c.path) == column.input), None)
+            at = "" if lead is None else f" = {show(plain(lead.values[sample]))} {lead.units}"
+            return f" (by its table for {column.input}{at.removesuffix(' 1')})"
+    return ""
+
+
 def _check_extremes(base: Scene, table: Table, design: Design) -> None:
     """Build scenes with the least and the greatest value, and each word, of every input."""
     spans: set[int] = set()
@@ -298,6 +309,7 @@ def _check_extremes(base: Scene, table: Table, design: Design) -> None:
         except InputError as error:
             told = _named(base, list(values), error)
             path = max((path for path in values if path in told), key=len, default="")
+            told += _from_table(table, path, sample)
             raise InputError(f"{design.where(sample, path)}: {told}; {design.cure}") from None
     if len(spans) > 1:
         raise InputError(

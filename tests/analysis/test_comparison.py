@@ -245,7 +245,7 @@ def test_verdicts_on_requirements_whose_limits_differ_are_told():
         (np.random.default_rng(3).random(COUNT), "hardly go together"),
         (-0.5 * VALUES + 2.0 * np.random.default_rng(4).random(COUNT), "tend to turn round"),
         (5.0 + 1e-4 * VALUES, ""),  # all the same to the digits that are told
-        (5.0 - 1e-2 * VALUES, ""),  # they turn round by 0.2 %
+        (5.0 - 1e-2 * VALUES, "say little of asynchrony_max"),  # they turn round by 0.2 %
     ],
 )
 def test_the_ranks_of_pairs_are_told_to_turn_round(other, words):
@@ -255,7 +255,8 @@ def test_the_ranks_of_pairs_are_told_to_turn_round(other, words):
     told = [line for line in compared(found) if "ranks of pairs" in line]
     assert len(told) == bool(words)
     assert all(f"{words}: " in line for line in told)
-    assert all(line.endswith(f"asynchrony_max ({expected:+.2f})") for line in told)
+    if "little" not in words:
+        assert all(line.endswith(f"asynchrony_max ({expected:+.2f})") for line in told)
 
 
 def test_an_output_that_one_of_two_does_not_have_is_told_as_none():

@@ -145,11 +145,13 @@ def test_a_comparison_has_both_margins_to_the_limits_that_both_have() -> None:
         "margin in second",
     )  # fmt: skip
     assert table.rows[0] == ("limits.tension = 30 N", "27 N", "40.5 N", "+0.111", "-0.259")
-    # Of two runs as of campaigns of one sample; of other limits nothing is told.
+    # Of two runs as of campaigns of one sample; each has the margin to its own limit.
     runs = [each.isel(sample=2, drop=True) for each in (first, second)]
     found = compare(*runs)
     assert found["limit_value"].values[0] == pytest.approx([22.0, 33.0])
-    assert "limits" not in sections(compare(first, with_limits(made_campaign(8), tension=31.0)))
+    other = compare(first, with_limits(made_campaign(8), tension=31.0))
+    (row,) = sections(other)["limits"].tables[0].rows
+    assert row == ("limits.tension = 30 N and 31 N", "27 N", "27 N", "+0.111", "+0.148")
     assert "limits" not in sections(compare(first, made_campaign(8)))
 
 

@@ -169,6 +169,11 @@ def test_dry_run_says_which_requirement_so_many_samples_cannot_show(bench):
         printed = bench.run("campaign", bench.write(samples, more=more), "--dry-run", "--out", "o")
         assert (f"asynchrony_max: {samples} samples cannot prove" in printed) == told
         assert ("at least 22 are needed" in printed) == told
+        line = "  requirement    asynchrony_max <= 10 deg with probability 0.9, confidence 0.9\n"
+        assert line in printed
+    more = "[requirements]\nasynchrony_max = { min = 1.0, probability = 0.9, confidence = 0.9 }"
+    printed = bench.run("campaign", bench.write(22, more=more), "--dry-run", "--out", "o")
+    assert "confidence 0.9 (doubtful: larger values are the worse ones: is max meant?)" in printed
 
 
 def test_dry_run_says_where_the_design_makes_inputs_go_together(bench):

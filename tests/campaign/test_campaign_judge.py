@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 
 import numpy as np
@@ -205,6 +206,16 @@ def test_a_dry_run_tells_what_checks_cost(checked):
         assert basis in cost
         assert "predicted      about" in printed
     assert not (checked.folder / "new").exists()
+
+
+def test_a_dry_run_tells_what_samples_with_error_bars_cost(checked):
+    path = written(checked, samples=9)
+    path.write_text("error_bars_every = 4\n" + path.read_text())
+    printed = checked.run("campaign", "small.toml", "--out", "new", *CALL[4:], "--dry-run")
+    (cost,) = re.findall(r"  cost           (\S+) s each \((.*?)\), from", printed)
+    own, barred = (part.rpartition("bars ")[2].split() for part in cost[1].split(";"))
+    assert float(barred[0]) > 2.0 * float(own[-2])
+    assert float(own[0]) < float(cost[0]) < float(barred[-2])
 
 
 def test_of_a_check_that_takes_long_the_cost_is_estimated_and_none_is_run(tmp_path):

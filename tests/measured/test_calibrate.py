@@ -259,6 +259,10 @@ def test_clock_of_the_stand_is_found_too(tmp_path):
     )
     inputs = {k: v for k, v in PRIORS.items() if k != "rods.poisson_ratio"}
     file = write_file(tmp_path, 48, 3, more, inputs)
+    told = CliRunner().invoke(cli, ["calibrate", str(file), "--dry-run", "--workers", "1"])
+    assert (
+        "\n  clock.offset: normal, mean 0, standard deviation 0.3\n  clock.drift: " in told.stdout
+    )
     posterior = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / "out")
     for name, value in (TRUTH | {f"clock.{k}": v for k, v in CLOCK.items()}).items():
         low, _, high = posterior["posterior_quantile"].sel(unknown=name).values

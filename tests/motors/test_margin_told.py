@@ -123,6 +123,15 @@ def test_a_dead_winch_is_told_beside_a_strong_one(scene: Scene, tmp_path: Path) 
     assert "both planes are equal" in told(tmp_path / "even.toml", scene)
 
 
+def test_the_cable_of_a_winch_that_starts_later_has_no_margin_yet(
+    scene: Scene, tmp_path: Path
+) -> None:
+    late = scene.with_values({"cables.lower.winch.start_time": 0.25})
+    text = told(tmp_path / "late.toml", late)
+    assert "  lower cable alone: its winch starts later, not included here\n" in text
+    assert re.search(r"^  upper cable alone: gives \S+ % of the drive", text, re.M)
+
+
 def test_where_round_off_resists_there_is_no_number(scene: Scene, tmp_path: Path) -> None:
     """The net's pull goes with the cosine of half the angle, to 1e-17 at 180 deg."""
     text = told(tmp_path / "net.toml", scene.with_values({"joints": {}}))

@@ -384,6 +384,15 @@ def test_refusals_of_campaigns_tell_the_cure(tmp_path: Path) -> None:
     path.write_text(f"{CAMPAIGN}\n{wanted}\n")
     line = refused("campaign", path, "--dry-run")
     assert line.endswith("probability = 95 must be below 1; 95 % are 0.95")
+    path.write_text(f"{CAMPAIGN}\n{wanted.replace('= 95', '= 1.0827989')}\n")
+    assert refused("campaign", path, "--dry-run").endswith("1.0827989 must be below 1")
+    own = "[outputs]\nmean_angle = { of = 'max(mean(opening_angel))' }"
+    path.write_text(f"{CAMPAIGN}\n{own}\n{wanted.replace('asynchrony_max', 'mean_angle')}\n")
+    line = refused("campaign", path, "--dry-run")
+    assert line.endswith("did you mean opening_angle?); also at fault: "
+                         "requirements.mean_angle.probability")  # fmt: skip
+    path.write_text(path.read_text().replace("= 95", "= 0.95"))
+    assert refused("campaign", path, "--dry-run").endswith("did you mean opening_angle?)")
 
 
 @for_each(
