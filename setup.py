@@ -5,6 +5,7 @@ import platform
 from pathlib import Path
 
 from setuptools import Extension, setup
+from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_ext import build_ext
 
 FOLDER = Path("ringsim/core/c")
@@ -36,7 +37,13 @@ def core(name: str, flags: list[str]) -> Extension:
 
 
 class Build(build_ext):
-    """Objects of each library in a folder of their own, as both are of the same sources."""
+    """Objects of each library in a folder of their own, as both are of the same sources; libraries
+    whose names say nothing of Python's version.
+    """
+
+    def get_ext_filename(self, fullname: str) -> str:
+        """See setuptools."""
+        return f"{fullname.replace('.', '/')}.so"
 
     def build_extension(self, ext: Extension) -> None:
         """See setuptools."""
@@ -45,7 +52,15 @@ class Build(build_ext):
         self.build_temp = before
 
 
+class Wheel(bdist_wheel):
+    """One wheel for all versions of Python."""
+
+    def get_tag(self) -> tuple[str, str, str]:
+        """See setuptools."""
+        return "py3", "none", super().get_tag()[2]
+
+
 setup(
     ext_modules=[core("_core", []), *([core("_wide", WIDE)] if WIDE else [])],
-    cmdclass={"build_ext": Build},
+    cmdclass={"build_ext": Build, "bdist_wheel": Wheel},
 )

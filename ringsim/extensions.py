@@ -14,7 +14,7 @@ import re
 import sys
 import tomllib
 import traceback
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
@@ -95,18 +95,35 @@ def digest(names: Sequence[str]) -> str:
     return hashlib.blake2b("".join(every).encode(), digest_size=6).hexdigest() if every else ""
 
 
+def files_of(names: Sequence[str]) -> set[str]:
+    """The files of modules that were loaded, and of what they import beside them."""
+    return {str(file) for name in names for file in _files(_module(name)).values()}
+
+
+def line_in(files: Collection[str], error: BaseException) -> str:
+    """The line of some files where an error came from, as " (my_laws.py, line 7)"; empty where it
+    came from others.
+    """
+    own = [step for step in traceback.extract_tb(error.__traceback__) if step.filename in files]
+    return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+
+
 def _digest(module: ModuleType) -> str:
-    top = sys.modules[module.__name__.partition(".")[0]]
-    if (paths := getattr(top, "__path__", None)) is not None:
-        folder = Path(next(iter(paths)))
-        files = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*.py")}
-    else:
-        files = _with_helpers(Path(str(module.__file__)))
+    files = _files(module)
     found = hashlib.blake2b(digest_size=6)
     for place in sorted(files):
         content = files[place].read_bytes()
         found.update(f"{place} {len(content)} ".encode() + content)
     return found.hexdigest()
+
+
+def _files(module: ModuleType) -> dict[str, Path]:
+    """Those of its package, or its own and those beside it that it imports, by their places."""
+    top = sys.modules[module.__name__.partition(".")[0]]
+    if (paths := getattr(top, "__path__", None)) is None:
+        return _with_helpers(Path(str(module.__file__)))
+    folder = Path(next(iter(paths)))
+    return {file.relative_to(folder).as_posix(): file for file in folder.rglob("*.py")}
 
 
 def _with_helpers(file: Path) -> dict[str, Path]:

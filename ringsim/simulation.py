@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ringsim import extensions
 from ringsim.cable import friction
 from ringsim.cable.control import OUTSIDE, Outside, Readings, checked, places_of
 from ringsim.choice import kind_of
@@ -163,7 +164,8 @@ def _run(
         except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
             traceback.print_exc()  # a campaign keeps it in the sample's log
             cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
-            return Outcome(Status.ERROR, f"{type(error).__name__}: {error}", cause=cause)
+            place = extensions.line_in(extensions.files_of(scene.imports), error)
+            return Outcome(Status.ERROR, f"{type(error).__name__}: {error}{place}", cause=cause)
 
     def so_solved(solver: Solver) -> Scene:
         return scene.model_copy(update={"solver": solver})

@@ -221,7 +221,7 @@ def digests(table: Table, attributes: dict[str, Any]) -> list[str]:
 def other_build(old: Folder) -> str:
     """That another build, or a module that has changed since, began a folder; empty if not."""
     if extensions.digest(old.scene.imports) != old.attributes.get("modules", ""):
-        return f"a file of {', '.join(old.scene.imports)} has changed since it began"
+        return f"a file of {' or '.join(old.scene.imports)} has changed since it began"
     mine = build.provenance()
     if old.attributes["sources"] == mine["sources"]:
         return ""

@@ -19,7 +19,7 @@ from ringsim.analysis.design import placement_of
 from ringsim.analysis.influence import pairs
 from ringsim.analysis.intervals import quantities, samples_needed
 from ringsim.analysis.requirements import Requirement
-from ringsim.campaign.folder import Folder, digests, opened_as
+from ringsim.campaign.folder import Folder, digests, opened_as, other_build
 from ringsim.campaign.run import Order, grown, growth_told
 from ringsim.campaign.stopping import End, decided, is_behind, looks_of
 from ringsim.choice import kind_of
@@ -389,6 +389,8 @@ def status_lines(campaign: Folder) -> list[str]:
             lines.append(f"  rate           {rate:.3g} samples/s{beside}")
         about = time_left(campaign, left, spent / np.maximum(ended, 1), workers)
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
+    if left and (changed := other_build(campaign)):
+        lines.append(f"  not continued  {changed.strip()}: what is left is refused")
     return [*lines, f"  next           {_next(campaign, left, growth)}"]
 
 

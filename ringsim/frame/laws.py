@@ -1,5 +1,6 @@
 """Laws of parts and cables as lists of operations, which the core plays back."""
 
+import inspect
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -8,6 +9,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from ringsim.core.chain import Seen
 from ringsim.core.library import call
+from ringsim.extensions import line_in
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Skeleton
 from ringsim.layout.bodies import Array, JointOpening
 from ringsim.parts.joints import JointFriction
@@ -131,9 +133,10 @@ def taped(laws: Sequence[tuple[Law, tuple[int, ...], object]], inputs: int, resu
                 notes.end(each, place)
         except (TypeError, AttributeError, ValueError) as error:
             known = ", ".join(each.__name__ for each in _KNOWN)
+            where = line_in([inspect.getfile(type(record))], error)
             raise InputError(
-                f"{NOT_HERE} the law of {type(record).__name__}: {error} (write it with arithmetic "
-                f"and numpy's {known} on each number, or {CURE})"
+                f"{NOT_HERE} the law of {type(record).__name__}: {error}{where} (write it with "
+                f"arithmetic and numpy's {known} on each number, or {CURE})"
             ) from error
         left = sum(block.shape[1] for block in blocks)
         blocks.append(np.array([row.ravel() for row in notes.rows]))

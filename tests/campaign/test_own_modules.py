@@ -17,7 +17,7 @@ from campaign_bench import MPIEXEC, PYTHON
 from ringsim import Campaign, InputError, extensions, load_scene
 from ringsim.analysis import derived
 from ringsim.cli import cli
-from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED
 
 MODULE = '''
 """A bearing, a controller, an output and a distribution."""
@@ -182,6 +182,13 @@ def test_own_kinds_run_everywhere(study: Path, tmp_path: Path) -> None:
     file.write_text(file.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
     refused = call("campaign", "own.toml", "--out=done", code=EXIT_BAD_INPUT, cwd=moved)
     assert "has changed since it began" in refused
+    # Nothing is left, and the numbers hold: status has no word on it; else it has.
+    assert "not continued" not in call("status", "done", cwd=moved, fresh=True)
+    shutil.copytree(moved / "done", moved / "half")
+    for journal in (moved / "half/journals").iterdir():
+        journal.unlink()
+    told = call("status", "half", cwd=moved, fresh=True)
+    assert "has changed since it began: what is left is refused" in told
     file.unlink()
     refused = call("campaign", "own.toml", "--out=done", code=EXIT_BAD_INPUT, cwd=moved)
     assert f"there is no module {WORD}" in refused
@@ -265,6 +272,23 @@ def test_kinds_that_no_scene_could_choose_are_refused(
         assert refused.returncode == EXIT_BAD_INPUT, refused.stderr
         assert told in refused.stderr
         assert refused.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_an_error_within_a_law_names_its_line(fidelity: str, tmp_path: Path) -> None:
+    """Not one of ringsim's own lines, wherever these lie."""
+    text = MODULE.format(word="failing_law").replace("faded = np.exp", "faded = math.exp")
+    text = text.replace("from typing", "import math\nfrom typing", 1)
+    (tmp_path / "failing_law.py").write_text(text, encoding="utf-8")
+    line = next(k for k, each in enumerate(text.splitlines(), 1) if "math.exp" in each)
+    scene = load_scene("truss2").to_toml().replace("imports = []", 'imports = ["failing_law"]')
+    (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
+    own = ["kind='failing_law'", "kinetic=1.0", "speed=1e-3"]
+    words = [f"--set=cables.upper.friction.{each}" for each in own]
+    done = ringsim("run", "scene.toml", *words, f"--fidelity={fidelity}", folder=tmp_path)
+    # Frames refuse a law before they run; the other engine meets it as the run begins.
+    assert done.returncode == {"frame": EXIT_BAD_INPUT, "full": EXIT_FAILED}[fidelity]
+    assert f"(failing_law.py, line {line})" in done.stdout + done.stderr
 
 
 def test_an_entry_point_names_a_module_of_a_package(
