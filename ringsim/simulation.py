@@ -395,7 +395,7 @@ def steps(
             f"fidelity = {show(fidelity)}: there is no such model "
             f"({known_or_nearest(fidelity, FIDELITIES)})"
         )
-    outside = chosen.controller is not None and kind_of(chosen.controller) == "outside"
+    outside = chosen.controller is not None and chosen.controller.outside
     values: dict[str, Any] = {}
     if not outside:
         if chosen.controller is not None or period is None:

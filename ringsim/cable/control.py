@@ -191,6 +191,9 @@ class Controller(Model):
     of its own, so that what ``state`` holds begins anew in each.
     """
 
+    outside: ClassVar[bool] = False
+    """Whether a program that steps the run commands in its place."""
+
     period: Annotated[float, Field(ge=1e-4, le=1e6), Unit("s")]
     """Time from one sample to the next."""
     delay: SecondOrZero = 0.0
@@ -408,6 +411,7 @@ class Outside(Controller):
     """Commanded by the program that steps the run (``ringsim.steps``)."""
 
     kind: Literal["outside"] = "outside"
+    outside: ClassVar[bool] = True
 
     def step(self, time: float, readings: Readings) -> Mapping[str, float] | None:
         """See ``Controller``."""

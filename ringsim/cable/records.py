@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +45,9 @@ _STEP = 1e-30
 
 class Bracket(Model):
     """Any bracket; the pulley's distance from the V-joint's axis is the cable's block_offset."""
+
+    on_rod: ClassVar[bool] = False
+    """Whether it is fixed across a bar half, not to the V-joint."""
 
     def refusal(self, opening_angle: float) -> str | None:
         """Why it cannot open a ring that is stowed at this angle (deg), or None if it can."""
@@ -396,6 +399,7 @@ class BarHalfBracket(Bracket):
     """
 
     kind: Literal["bar-half"] = "bar-half"
+    on_rod: ClassVar[bool] = True
     angle: Annotated[float, Field(ge=90.0, le=270.0), Unit("deg")]
     """Angle theta."""
     half: Literal["first", "second"] = "first"

@@ -93,7 +93,7 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     if placed.population and not placed.has_intervals:
         lines.append(f"  statistics     {placed.told}")
     if placed.population and not campaign.specification.correlations:
-        lines += _confounded(table, kind_of(design))
+        lines += _confounded(table, design.independent)
     lines += _required(campaign.specification.requirements)
     if placed.population:
         lines += _out_of_reach(campaign.specification.requirements, table.samples)
@@ -256,7 +256,7 @@ def _out_of_reach(requirements: Mapping[str, Requirement], samples: int) -> list
     return lines
 
 
-def _confounded(table: Table, kind: str) -> list[str]:
+def _confounded(table: Table, independent: bool) -> list[str]:
     """A line if inputs go together, as points of a design do that are few for its dimensions."""
     found: dict[bytes, tuple[str, Array]] = {}
     for column in table.columns:
@@ -282,7 +282,7 @@ def _confounded(table: Table, kind: str) -> list[str]:
     others = f" (and {counted(more, 'other pair')})" * (more > 0)
     both = f"{names[first.first]} and {names[first.second]}"
     cure = "draw more samples"
-    if kind != "random":
+    if not independent:
         cure += ' per replicate, or use design.kind = "random"'
     return [
         f"  inputs         {both} have a rank correlation of {first.correlation:+.2f} in these "

@@ -27,7 +27,9 @@ from ringsim.analysis.ladder import (
 )
 from ringsim.analysis.stability import cells_of, checked, chosen_for_check, compared, joined
 from ringsim.campaign.run import run_cases
+from ringsim.choice import kinds_of
 from ringsim.overrides import field_at
+from ringsim.parts.rods import Rods
 from ringsim.parts.solver import MOST_STEPS
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import OneCoordinate, opening_time
@@ -363,7 +365,9 @@ class _Study:
             return f"{stage}-{FRAME}", True, FRAME
         if self.scene.structure.gauge:  # a strain for each of its elements
             return f"{stage}-elements-{rung.values['rods.elements']}", False, rung.fidelity
-        stressed = rung.values["rods.kind"] != "ancf"  # whose elements report no forces
+        # Elements without an orientation report no forces.
+        rods = kinds_of(Rods)[str(rung.values["rods.kind"])]
+        stressed = issubclass(rods, Rods) and rods.oriented
         return stage if stressed else f"{stage}-unstressed", stressed, rung.fidelity
 
 

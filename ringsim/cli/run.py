@@ -10,7 +10,6 @@ import click
 import numpy as np
 from tqdm import tqdm
 
-from ringsim.choice import kind_of
 from ringsim.cli.options import (
     ANIMATE,
     COLOUR,
@@ -184,7 +183,7 @@ def run_command(
     click.echo(f"{done} {target}")
     if plot:
         draw_figures(dataset, target.parent, target.stem, formats)
-        drawn = chosen.structure.locks and kind_of(chosen.rods) != "ancf"
+        drawn = chosen.structure.locks and chosen.rods.oriented
         # Not recorded for the figure: steps that resolve the rods' vibration are another run.
         if drawn and not chosen.record.stress:
             click.echo("figures of stress need --set record.stress=true")

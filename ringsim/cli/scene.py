@@ -139,7 +139,7 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
     for line in _doubtful(loaded):
         click.echo(f"doubtful: {line}")
     lacking = _lacking(loaded)
-    outside = loaded.controller is not None and kind_of(loaded.controller) == "outside"
+    outside = loaded.controller is not None and loaded.controller.outside
     how = "ringsim.steps in Python steps it" if outside else "ringsim run FILE runs it"
     click.echo(f"valid{lacking}: {how}")
 

@@ -6,7 +6,6 @@ import exudyn.itemInterface as item
 import numpy as np
 
 from ringsim.cable.records import BlockSheave, FixedSheave, Sheave
-from ringsim.choice import kind_of
 from ringsim.exudyn.cable_path import CablePath
 from ringsim.exudyn.cables import CableDrive
 from ringsim.exudyn.laws import AngleForces, Reacting, Weight, connect
@@ -15,7 +14,6 @@ from ringsim.exudyn.rods import Ancf
 from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import BoomBeam
 from ringsim.layout.points import BOOM_TIP
-from ringsim.parts.boom import FlexibleBoom
 from ringsim.scene import Scene
 
 # A flexible boom: a chain of elements, clamped at its top, with a body that slides along it.
@@ -41,8 +39,6 @@ class Boom:
 
     def __init__(self, model: Multibody, beam: BoomBeam, weight: Weight | None) -> None:
         assembly, boom = model.assembly, beam.record
-        if not isinstance(boom, FlexibleBoom):
-            raise TypeError(f"no builder for a boom of kind {kind_of(boom)}")
         self._data, self._unknown = assembly.system.systemData, -1
         top, pose = model.bodies[beam.top.body][0], model.layout.pose(beam.top)
         down, spin = pose.axes @ _DOWN, model.moving.turning(pose.turn)

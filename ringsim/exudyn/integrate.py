@@ -154,6 +154,8 @@ def solve(scene: Scene, watch: Watch | None = None) -> Outcome:
 class Integration(Run):
     """One run of a built model."""
 
+    _energy: EnergyMeter
+
     def __init__(self, built: Built, watch: Watch | None = None) -> None:
         model, scene = built.model, built.model.scene
         super().__init__(scene, watch)

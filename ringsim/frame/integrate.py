@@ -58,6 +58,7 @@ class Integration(Run):
 
     changing = ("_moves", "_taken", "_cubic", "_tried", "_steps")
     model: FrameModel
+    _energy: EnergyMeter
 
     def __init__(self, model: FrameModel, watch: Watch | None = None) -> None:
         scene = model.scene

@@ -28,7 +28,6 @@ from ringsim.frame.state import (
 )
 from ringsim.layout.bodies import Array
 from ringsim.layout.layout import layout_of
-from ringsim.parts.rods import GeometricallyExactRods
 from ringsim.refusal import InputError
 from ringsim.rigid.assembling import assembled
 from ringsim.rigid.statics import (
@@ -106,7 +105,7 @@ class FrameModel:
     """
 
     def __init__(self, scene: Scene) -> None:
-        if not isinstance(scene.rods, GeometricallyExactRods):
+        if not scene.rods.oriented:
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         drawn = layout_of(scene)
         self.scene = scene

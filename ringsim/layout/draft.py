@@ -39,7 +39,6 @@ from ringsim.layout.layout import (
     Layout,
     layout_at_opening,
 )
-from ringsim.parts.boom import RigidBoom
 from ringsim.parts.laws import AngleLaw, Corners, PairLaw, Reaction, Rub
 from ringsim.parts.rods import Tube
 from ringsim.refusal import InputError
@@ -71,15 +70,15 @@ def add_boom(draft: "Draft") -> BoomBeam | None:
     line = Lump("boom", boom.mass, centre, np.diag([along, along, 0.0]))
     sections = across * np.diag([0.5, 0.5, 1.0])
     _add_spacecraft(draft, top.body)
-    if not isinstance(boom, RigidBoom):
+    if boom.sliding is None:
         # Elements are lines: what the tube's sections have of inertia turns with its top.
         _add_lump(draft, top.body, Lump("boom", 0.0, np.zeros(3), sections))
         return BoomBeam(top, low, boom, line)
     _add_lump(draft, top.body, line._replace(inertia=line.inertia + sections))
     # A sleeve slides along z, a prismatic joint along x.
-    axes = SPACE if boom.joint == "sleeve" else _UPWARDS
+    axes = SPACE if boom.sliding == "sleeve" else _UPWARDS
     first, second = (end._replace(axes=axes) for end in (top, low))
-    draft.joints.append(Joint(boom.joint, "", 0, first, second))
+    draft.joints.append(Joint(boom.sliding, "", 0, first, second))
     return None
 
 
@@ -123,7 +122,7 @@ def hang(draft: "Draft", gravity: np.ndarray, base: int | None) -> Hung | None:
     )
     whole += 0.0 if net is None else net.point_mass
     # A rigid boom is a lump of the body at its top.
-    if boom is not None and not isinstance(boom, RigidBoom) and not draft.scene.held:
+    if boom is not None and boom.sliding is None and not draft.scene.held:
         whole += boom.mass
     held = draft.bodies[base] if base is not None and draft.scene.held else None
     if held is not None and base not in [body for body, _ in carried]:

@@ -33,6 +33,13 @@ class Boom(Model):
     """Mass over volume of the tube's material."""
 
     @property
+    def sliding(self) -> Literal["sleeve", "prismatic"] | None:
+        """The joint of a boom without deformation, which is a part of the body at its top; None of
+        one that is a chain of elements.
+        """
+        return None
+
+    @property
     def mass(self) -> float:
         """Mass in kg."""
         return self.density * self.tube.area * self.length
@@ -67,6 +74,11 @@ class RigidBoom(Boom):
 
     sleeve: on its axis, free to turn (a point on a line); prismatic: it cannot turn against the
     boom, as paper 002 has it (eq. 8)."""
+
+    @property
+    def sliding(self) -> Literal["sleeve", "prismatic"]:
+        """See ``Boom``."""
+        return self.joint
 
 
 # The spacecraft that carries the boom.

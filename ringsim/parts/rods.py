@@ -1,7 +1,7 @@
 """Rods: their tubes, their formulations, and errors of their lengths."""
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -95,6 +95,9 @@ def errors_of(rods: "Rods", sections: int) -> dict[str, list[float]]:
 class Rods(Model):
     """Elastic rods: diagonals and halves of the folding bars."""
 
+    oriented: ClassVar[bool] = True
+    """Whether its nodes have an orientation, and its elements tell their forces; only such rods may
+    be strained as they are built, hold what is fixed across them, and be run by frames."""
     elements: Annotated[int, Field(ge=1, le=64)] = 1
     """Elements per rod half."""
     young_modulus: PerSection[Pascal] = 120e9
@@ -142,6 +145,7 @@ class AncfRods(Rods):
     """
 
     kind: Literal["ancf"] = "ancf"
+    oriented: ClassVar[bool] = False
 
 
 # Geometrically exact (Simo-Reissner) beams.

@@ -131,10 +131,10 @@ def _shows(layout: Layout, what: str) -> bool:
 def _check_rods(scene: "Scene") -> None:
     """Refuse (ValueError) strained rods of a kind that cannot be."""
     what = strained(scene)
-    if what and kind_of(scene.rods) == "ancf":
+    if what and not scene.rods.oriented:
         raise ValueError(
-            f'{what} needs rods.kind = "geometrically-exact", not "ancf": choose that, or leave '
-            f"{what} out"
+            f'{what} needs rods.kind = "geometrically-exact", not "{kind_of(scene.rods)}": '
+            f"choose that, or leave {what} out"
         )
 
 

@@ -4,7 +4,7 @@ import itertools
 import math
 from bisect import bisect_right
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,12 @@ from ringsim.stepping.instant import Energies, Instant, Remembering, Scales, Str
 from ringsim.stepping.locks import Latches, locks_of
 
 if TYPE_CHECKING:
+    from ringsim.cable.chain import ChainState
+    from ringsim.cable.records import Cable
+    from ringsim.cable.ropes import Ropes
+    from ringsim.cable.winches import Winches
+    from ringsim.outputs.recorder import Recorder
+    from ringsim.parts.laws import Switches
     from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
@@ -50,6 +56,54 @@ class Events:
         return self.after(time - 2.0 * AT_ONCE) <= time + AT_ONCE
 
 
+# What a run asks of an engine beside the state, which each has in its own form.
+
+
+class Model(Protocol):
+    """What is moved."""
+
+    def turn_loads(self) -> None:
+        """Let the forces of ``Loads`` act the other way round."""
+
+
+class Meter(Protocol):
+    """What counts the work that is done on the model."""
+
+    def keep(self) -> None:
+        """Go on from what was read last."""
+
+    def go_on_from(self, work: Any, state: Any) -> None:
+        """Count from a state on, with the work done until there."""
+
+
+class Cables(Protocol):
+    """Ropes and winches of the model."""
+
+    ropes: "Ropes"
+    winches: "Winches"
+
+    @property
+    def present(self) -> "list[tuple[int, Cable]]":
+        """The cables with the planes that they are in."""
+
+    def take(self, ropes: "Ropes") -> None:
+        """Go on with ropes that a fault may have changed."""
+
+    def begin(self, time: float, state: "ChainState", slopes: Array) -> None:
+        """Begin a step at a time (s), with the slopes of the ideal paths, m/rad."""
+
+
+class Laws(Protocol):
+    """Laws on V-joints."""
+
+    @property
+    def switches(self) -> "Switches":
+        """Which of them act."""
+
+    def follow(self) -> None:
+        """Take what acts from the switches."""
+
+
 # The run.
 
 
@@ -69,10 +123,10 @@ class Run(Remembering):
         The recorder of the run.
     """
 
-    model: Any
-    _energy: Any
-    _cables: Any
-    history: Any
+    model: Model
+    _energy: Meter
+    _cables: Cables | None
+    history: "Recorder"
 
     def __init__(self, scene: "Scene", watch: Any) -> None:
         self._scene, self._watch = scene, watch
@@ -106,12 +160,12 @@ class Run(Remembering):
         raise NotImplementedError
 
     @property
-    def _at(self) -> Any:
+    def _at(self) -> "ChainState | None":
         """The chain of the cables there, None without."""
         raise NotImplementedError
 
     @property
-    def _laws(self) -> Any:
+    def _laws(self) -> Laws:
         """The laws on V-joints, with their ``switches`` and what lets the engine ``follow``."""
         raise NotImplementedError
 
@@ -147,7 +201,13 @@ class Run(Remembering):
         cables.begin(now.time, chain, cables.winches.path_slopes(path_slope))
 
     def _told(
-        self, time: float, angles: Array, rates: Array, energies: Energies, gap: float, chain: Any
+        self,
+        time: float,
+        angles: Array,
+        rates: Array,
+        energies: Energies,
+        gap: float,
+        chain: "ChainState | None",
     ) -> Instant:
         """A state with its ropes, and whether anything still drives it."""
         tensions, stretch, driven = None, 0.0, math.isfinite(self._faults.next_time)
@@ -190,7 +250,7 @@ class Run(Remembering):
 
     def _command(self, now: Instant) -> bool:
         """Let the controller sample; returns whether a winch has another law since."""
-        if self._sampler is None:
+        if self._sampler is None or self._cables is None:
             return False
         speeds = self._sampler.due(now.time, now.angles, self._at)
         return bool(speeds) and self._cables.winches.command(now.time, speeds)

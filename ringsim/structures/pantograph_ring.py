@@ -369,10 +369,11 @@ class PantographRing(Structure):
             reason = cable.bracket.refusal(self.opening_angle)
             if reason is not None:
                 raise ValueError(f"cables.{self.planes[plane]}.{reason}")
-            if kind_of(cable.bracket) == "bar-half" and kind_of(scene.rods) == "ancf":
+            if cable.bracket.on_rod and not scene.rods.oriented:
                 raise ValueError(
-                    f'cables.{self.planes[plane]}.bracket.kind = "bar-half" needs rods.kind = '
-                    '"geometrically-exact", not "ancf": choose one of both'
+                    f'cables.{self.planes[plane]}.bracket.kind = "{kind_of(cable.bracket)}" needs '
+                    f'rods.kind = "geometrically-exact", not "{kind_of(scene.rods)}": choose one '
+                    "of both"
                 )
         if present and self.sections > 1 and self.hinge_offset < LEAST_HINGE_OFFSET:
             raise ValueError(

@@ -234,7 +234,7 @@ class PlanarTruss(Structure):
                 f'cables.upper.end = "{scene.cables.upper.end}" must be "first": the winch '
                 "stands on the fixed axis"
             )
-        if kind_of(scene.rods) != "geometrically-exact":
+        if not scene.rods.oriented:
             raise ValueError(
                 f'rods.kind = "{kind_of(scene.rods)}" must be "geometrically-exact": the cable '
                 "of a planar truss runs to a node with an orientation"
