@@ -249,14 +249,20 @@ def worst(
     campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
     rows, chosen = list[tuple[str, int, int, str]](), list[int]()
     sides, every = list[dict[str, bool]](), _sides(analysis, campaign.sizes["sample"])
+    wider = list[tuple[Mask, dict[str, bool]]]()
     for each in _failures(campaign, requirements):
         own = np.flatnonzero(each.own)
+        side = _of_failure(every, each.words) or _of_output(analysis, each, campaign)
+        # A few stalled rings are told by what separates all that do not deploy, as if named there.
+        if not side and not each.value:
+            side = next((s for mask, s in wider if s and mask[own].all()), {})
+        wider.append((each.own, side))
         order = own[np.argsort(-each.badness[own], kind="stable")][:MOST]
         for place in order.tolist():
             told = _found(campaign, each.value, place)
             rows.append((each.words, int(each.own.sum()), campaign.sizes["sample"], told))
             chosen.append(place)
-            sides.append(_of_failure(every, each.words) or _of_output(analysis, each, campaign))
+            sides.append(side)
     if not rows:
         return xr.Dataset()
     failures, failed, of, found = zip(*rows, strict=True)

@@ -151,6 +151,19 @@ def test_what_separates_the_failures_is_named_first_however_common_it_is() -> No
     assert (name, told) == ("faults = stuck-vjoint", "more often by 100 percentage points")
 
 
+def test_few_of_a_failure_are_told_by_what_separates_the_whole() -> None:
+    """Of the rings that fail to deploy two have stalled: too few to tell what separates them."""
+    random = np.random.default_rng(1)
+    stuck = np.arange(100) % 4 == 0
+    one = stalled_by(stuck, np.full(100, 293.0), random.random((100, 5)))
+    one["outcome"][np.flatnonzero(stuck)[2:]] = Fate.CUT_OFF
+    wanted = read_requirements({"outcome": {"is": "deployed"} | BOUND}, "file")
+    found = analyse(one, wanted)
+    told = dict(zip(found.worst_failure.values, found.worst_inputs.values, strict=True))
+    assert set(told) == {"violates outcome is deployed", "stalled", "cut off"}
+    assert all(each.startswith("faults = stuck-vjoint (as in 25 of 100)") for each in told.values())
+
+
 def test_a_sample_on_the_other_side_is_not_told_by_what_separates_the_rest() -> None:
     random = np.random.default_rng(2)
     stuck, cold = np.arange(400) % 40 == 0, 225.0 + 100.0 * random.random(400)
