@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from ringsim.measured import Measurement
+
 
 class Figures(dict[str, "Figure"]):
     """Figures by name; a notebook shows them below each other."""
@@ -184,10 +186,11 @@ class Ring:
                     found[table.title or table.head[0]] = rows
         return found
 
-    def dossier(self) -> "dict[str, pd.DataFrame]":
+    def dossier(self, test: "Measurement | None" = None) -> "dict[str, pd.DataFrame]":
         """What ``ringsim dossier`` tells of a campaign, by standard: a row a clause, with what it
         asks, whether it is analysed, the result and its evidence; how the standard is known is
-        ``notes`` among the ``attrs``.
+        ``notes`` among the ``attrs``.  Readings of a ``test`` (``ringsim.measured``) stand beside
+        the samples.
 
         InputError if it is no campaign, or its requirements cannot be judged.
         """
@@ -197,7 +200,7 @@ class Ring:
 
         self._require_samples("a dossier")
         found = {}
-        for table in dossier(self._dataset):
+        for table in dossier(self._dataset, test=test):
             found[table.title] = pd.DataFrame(table.rows, columns=table.head)
             found[table.title].attrs["notes"] = list(table.notes)
         return found

@@ -2,6 +2,7 @@
 
 import math
 import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from typing import NamedTuple
@@ -220,3 +221,25 @@ def with_unit(number: str, units: str) -> str:
 def unit_behind(words: str, units: str) -> str:
     """What a number is, and its unit: "tension (N)"."""
     return words if units == "1" else f"{words} ({unit_text(units)})"
+
+
+# Tables whose cells are sentences: a block a row.
+
+
+def block_lines(tables: Iterable[Table], head: Iterable[str], width: int = 100) -> list[str]:
+    """The lines for a terminal of tables with a name and a state in the first and third column, and
+    cells of several lines in the others; ``head`` stands above all.
+    """
+    told = [line for each in head for line in textwrap.wrap(each, width)]
+    for table in tables:
+        told += ["", table.title, *(each for n in table.notes for each in textwrap.wrap(n, width))]
+        for name, asks, state, *cells in table.rows:
+            told += ["", *textwrap.wrap(f"{name}: {state}", width)]
+            for column, cell in zip(("asks", *table.head[3:]), (asks, *cells), strict=True):
+                for k, line in enumerate(cell.splitlines()):
+                    first = f"  {'' if k else column:<10}"
+                    told += textwrap.wrap(
+                        line, width, initial_indent=first, subsequent_indent=" " * 14,
+                        break_long_words=False, break_on_hyphens=False,
+                    )  # fmt: skip
+    return told

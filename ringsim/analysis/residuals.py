@@ -305,8 +305,9 @@ def _of_campaign(told: xr.Dataset) -> list[str]:
     notes = [
         "difference: measured less the median of the samples; within 90 %: share of the readings "
         "in the band that holds 90 % of the samples, with the scatter of a reading",
-        f"all sensors: {number_text(share, 2)} of {counted(int(compared.sum()), 'reading')} lie in "
-        "it; far less than 0.9 says that the inputs scatter too little, or about wrong values",
+        f"all sensors: {round(share * compared.sum())} of "
+        f"{counted(int(compared.sum()), 'reading')} ({number_text(share, 2)}) lie in it; far less "
+        "than 0.9 says that the inputs scatter too little, or about wrong values",
     ]
     if beyond := int(told["beyond_samples"].sum()):
         notes.append(

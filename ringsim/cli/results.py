@@ -31,6 +31,11 @@ from ringsim.refusal import EXIT_DONE, EXIT_NOT_MET, InputError, known_or_neares
 from ringsim.storage.netcdf import runs_in
 from ringsim.tables import counted, size_text, slim
 
+_MEASURED = click.option(
+    "--measured", metavar="TOML", type=PATH,
+    help="Lay the measured data of this file beside the samples, too.",
+)  # fmt: skip
+
 
 def opened(path: Path) -> xr.Dataset:
     """The dataset in a file, or of the campaign in a folder, as ``open_stored`` opens it.
@@ -150,10 +155,7 @@ def _save(found: xr.Dataset, out: Path | None) -> None:
     "--analysis", metavar="FILE", type=PATH,
     help="Show the analysis in this file (from ringsim analyse --out) instead of a new one.",
 )  # fmt: skip
-@click.option(
-    "--measured", metavar="TOML", type=PATH,
-    help="Lay the measured data of this file beside the samples, too.",
-)  # fmt: skip
+@_MEASURED
 @click.option("--pdf", is_flag=True, help="Also write a PDF of the same name (needs chromium).")
 def report_command(
     folder: Path, out: Path, analysis: Path | None, measured: Path | None, pdf: bool
@@ -172,20 +174,23 @@ def report_command(
 @click.command()
 @click.argument("folder", metavar="DIR", type=PATH)
 @click.option("--out", metavar="FILE", type=PATH, default=Path("dossier.html"), show_default=True)
+@_MEASURED
 @click.option("--pdf", is_flag=True, help="Also write a PDF of the same name (needs chromium).")
-def dossier_command(folder: Path, out: Path, *, pdf: bool) -> None:
+def dossier_command(folder: Path, out: Path, measured: Path | None, *, pdf: bool) -> None:
     """List what the campaign in DIR, or in a file campaign.nc, shows of each clause of the
     standards ECSS-E-ST-33-01C and NASA-STD-7009: the numbers, their evidence, and what is missing.
 
     The same is written as a page that loads nothing: it can be mailed, printed and kept.
     """
+    from ringsim.measured import load_measured
     from ringsim.report.dossier import write_dossier
 
     _require_page("--out", out, pdf=pdf)
     with opened(folder) as campaign:
         try:
             own = folder if folder.is_dir() else folder.parent
-            size, told = write_dossier(campaign, out, str(own))
+            test = None if measured is None else load_measured(measured)
+            size, told = write_dossier(campaign, out, str(own), test)
         except InputError as error:
             raise InputError(f"{folder}: {error}") from None
     for line in told:

@@ -4,7 +4,6 @@ One subject is one function, with ``@item`` for each clause that it answers; not
 """
 
 import re
-import textwrap
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,6 +20,7 @@ from ringsim.analysis.engines import differences, verdict
 from ringsim.analysis.influence_text import what_matters
 from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
+from ringsim.analysis.residuals import residual_table, residuals
 from ringsim.analysis.study import SOURCES, analyse
 from ringsim.analysis.study_text import (
     error_tables,
@@ -33,11 +33,12 @@ from ringsim.analysis.tails import tail_table
 from ringsim.analysis.verdicts import BOUND, SHARE_MET, verdict_table
 from ringsim.analysis.worst import command, margin_table, worst_tables
 from ringsim.files import write_text
+from ringsim.measured import Measurement
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
 from ringsim.report.page import drawn_inputs, provenance, values_of
 from ringsim.report.shell import written
-from ringsim.tables import Table, counted, number_text, with_unit
+from ringsim.tables import Table, block_lines, counted, number_text, with_unit
 from ringsim.variables import Status
 
 ECSS = "ECSS-E-ST-33-01C (6 March 2009), Mechanisms"
@@ -70,6 +71,8 @@ class Of(NamedTuple):
     """The error budget, and errors of the solution."""
     mark: str
     """What stands behind outputs that lost runs bend."""
+    test: Table
+    """Readings of a test beside the samples, without rows where there are none."""
 
 
 @dataclass
@@ -122,11 +125,14 @@ def item(standard: str, clause: str, asks: str) -> Callable[[Ask], Ask]:
     return register
 
 
-def dossier(campaign: xr.Dataset, analysis: xr.Dataset | None = None) -> list[Table]:
+def dossier(
+    campaign: xr.Dataset, analysis: xr.Dataset | None = None, test: Measurement | None = None
+) -> list[Table]:
     """A table a standard, a row a clause, columns ``HEAD``; cells may have several lines.
 
-    All numbers are those of ``analysis``, what ``analyse`` gives, by default of today.  InputError
-    if it is no campaign, or its requirements cannot be judged.
+    All numbers are those of ``analysis``, what ``analyse`` gives, by default of today; readings of
+    a ``test`` stand beside the samples.  InputError if it is no campaign, its requirements cannot
+    be judged, or it does not have what was measured.
     """
     if not {"scene", "campaign"} <= campaign.attrs.keys():
         raise InputError(
@@ -136,7 +142,9 @@ def dossier(campaign: xr.Dataset, analysis: xr.Dataset | None = None) -> list[Ta
     analysis = analyse(campaign) if analysis is None else analysis
     scene = flat(tomllib.loads(str(campaign.attrs["scene"])))
     told = statistics_table(analysis, every=True), error_tables(analysis, every=True)
-    of = Of(campaign, analysis, scene, *told, notes.MARK * bool(analysis.attrs[notes.NOTE]))
+    beside = Table((), ()) if test is None else residual_table(residuals(campaign, test))
+    mark = notes.MARK * bool(analysis.attrs[notes.NOTE])
+    of = Of(campaign, analysis, scene, *told, mark, beside)
     found = list[Table]()
     for standard, known in KNOWN.items():
         own = sorted((e for e in ITEMS if e.standard == standard), key=lambda each: each.place)
@@ -154,31 +162,16 @@ def dossier(campaign: xr.Dataset, analysis: xr.Dataset | None = None) -> list[Ta
     return found
 
 
-def lines(tables: Iterable[Table], head: Iterable[str], width: int = 100) -> list[str]:
-    """The same for terminals: a block a row, since cells are sentences."""
-    told = [line for each in head for line in textwrap.wrap(each, width)]
-    for table in tables:
-        told += ["", table.title, *(each for n in table.notes for each in textwrap.wrap(n, width))]
-        for clause, asks, state, *cells in table.rows:
-            told += ["", *textwrap.wrap(f"{clause}: {state}", width)]
-            for name, cell in zip(("asks", *HEAD[3:]), (asks, *cells), strict=True):
-                for k, line in enumerate(cell.splitlines()):
-                    first = f"  {'' if k else name:<10}"
-                    told += textwrap.wrap(
-                        line, width, initial_indent=first, subsequent_indent=" " * 14,
-                        break_long_words=False, break_on_hyphens=False,
-                    )  # fmt: skip
-    return told
-
-
-def write_dossier(campaign: xr.Dataset, out: Path, folder: str) -> tuple[int, list[str]]:
+def write_dossier(
+    campaign: xr.Dataset, out: Path, folder: str, test: Measurement | None = None
+) -> tuple[int, list[str]]:  # fmt: skip
     """Write the page of a merged campaign; its size in bytes, and its lines for a terminal.
 
-    ``folder`` is what readers give to ``ringsim replay``.  InputError if the file cannot be
-    written, or the requirements cannot be judged.
+    ``folder`` is what readers give to ``ringsim replay``; InputError as of ``dossier``, and if the
+    file cannot be written.
     """
     analysis = analyse(campaign)
-    tables = dossier(campaign, analysis)
+    tables = dossier(campaign, analysis, test)
     says, counts = campaign.attrs, Counter(row[2] for each in tables for row in each.rows)
     told = ", ".join(f"{counts[state]} {state}" for state in STATES if counts[state])
     head = [
@@ -194,7 +187,7 @@ def write_dossier(campaign: xr.Dataset, out: Path, folder: str) -> tuple[int, li
     }  # fmt: skip
     text = written("dossier.html.j2", context, ())
     write_text(out, text)
-    return len(text.encode("utf-8")), lines(tables, head)
+    return len(text.encode("utf-8")), block_lines(tables, head)
 
 
 # What several items tell: outputs, requirements, inputs, each out of a table of the analysis.
@@ -365,9 +358,8 @@ def _drive(of: Of) -> Answer:
         return found
     k, short = int(np.argmin(np.where(held, values, np.inf))), int((values[held] < 0.0).sum())
     angle, time = (numbers(of.campaign, f"{name}_{word}")[k] for word in ("angle", "time"))
-    sample = int(of.campaign["sample"][k])
     found.result += [
-        f"in sample {sample} it is least at {angle:.3g} deg, {time:.3g} s",
+        f"in sample {int(of.campaign['sample'][k])} it is least at {angle:.3g} deg, {time:.3g} s",
         f"below 0 in {short} of {int(held.sum())} samples" + ": NOT enough" * bool(short),
         *filter(None, [of.analysis.attrs.get(notes.LATE)]),
     ]
@@ -453,14 +445,12 @@ def _faults(of: Of) -> Answer:
 def _integrity(of: Of) -> Answer:
     rows = [row for each in of.errors for row in each.rows if "median" in each.head]
     found = Answer([f"{name}: median {median}, largest {most}" for name, median, most, _ in rows])
-    found.evidence += sorted({f"{row[-1]} samples" for row in rows}) + notes.remark_lines(
-        of.campaign
-    )
+    found.evidence += sorted({f"{row[-1]} samples" for row in rows})
+    found.evidence += notes.remark_lines(of.campaign)
     return found if rows else Answer(lacks={"energy balance": "no sample has a valid result"})
 
 
-_SHOWN = 5
-"""Outputs that are told what matters for, where no requirement chooses them."""
+_SHOWN = 5  # outputs that are told what matters for, where no requirement chooses them
 
 
 @item(ECSS, "4.8.2.6.3 d Sensitivity analysis", "Which uncertain parameters matter.")
@@ -487,8 +477,20 @@ def _sensitivity(of: Of) -> Answer:
 @item(ECSS, "4.8.2.6.3 e, f Test", "Differences of test and prediction are explained.")
 @item(NASA, "factor 2, validation (second-hand)", "How well results agree with the real thing.")
 def _validation(of: Of) -> Answer:
-    cure = "ringsim compare DIR TEST.toml and ringsim report --measured lay them beside the samples"
-    return Answer(learnt_lines(of.campaign), lacks={"readings of a test": cure})
+    found = Answer(learnt_lines(of.campaign))
+    for row in of.test.rows:
+        cell = dict(zip(of.test.head, row, strict=True))
+        most, sigma = (with_unit(cell[n], cell["unit"]) for n in ("largest difference", "sigma"))
+        found.result.append(
+            f"{cell['sensor']}: a share of {cell['within 90 %']} of {cell['readings']} readings in "
+            f"the band of 90 % of the samples; largest difference {most} at {cell['at (s)']} s, "
+            f"scatter of a reading {sigma}"
+        )
+        if (beyond := cell["beyond all samples"]) != "-":
+            found.lacks[f"why {beyond} of {cell['sensor']} lie beyond all samples"] = "people"
+    if not of.test.rows:
+        found.lacks["readings of a test"] = "ringsim dossier DIR --measured TEST.toml"
+    return found + Answer(evidence=list(of.test.notes))
 
 
 # NASA-STD-7009.
@@ -503,8 +505,7 @@ def _verification(of: Of) -> Answer:
         found.lacks["numerical error bars"] = "error_bars_every"
     if f"status{CHECKED}" not in of.campaign:
         fast = of.campaign.attrs.get("fidelity") == "frame"
-        cure = "check_every" if fast else 'fidelity = "frame" with check_every'
-        found.lacks["the other engine"] = cure
+        found.lacks["the other engine"] = 'fidelity = "frame" with ' * (not fast) + "check_every"
         return found
     checked = (of.campaign[f"status{CHECKED}"] == Status.OK).to_numpy() & good(of.campaign)
     found.evidence.append(f"{counted(int(checked.sum()), 'sample')} answered by both engines")
@@ -525,9 +526,8 @@ def _pedigree(of: Of) -> Answer:
     told = ", ".join(f"{counts[k]} {word}" for k, word in _ORIGINS.items() if counts[k])
     found = Answer([f"{counts.total()} values: {told}", *_drawn(of, lambda *_: True)])
     found.evidence.append("ringsim report lists every value and its origin")
-    if learnt := learnt_lines(of.campaign):
-        found.result += learnt
-    else:
+    found.result += learnt_lines(of.campaign)
+    if not learnt_lines(of.campaign):
         found.lacks["inputs that a test has told"] = 'ringsim calibrate, then from = "posterior.nc"'
     if not counts["inferred"] + counts["default"]:
         found.lacks["which values are assumed"] = "a file of one's own does not tell: list them"
@@ -549,10 +549,10 @@ def _uncertainty(of: Of) -> Answer:
     largest = dict[str, list[str]]()
     for name in quantities():
         cell = _cells(of.errors, name)
-        if source := cell.get("dominates", "-").partition(" ")[0].strip("-"):
-            bare = cell["numerical (error bars)"] == "-" and not is_moment(name)
-            if not is_moment(name):
-                largest.setdefault(_UNMEASURED if bare else source, []).append(name)
+        source = cell.get("dominates", "-").partition(" ")[0].strip("-")
+        if source and not is_moment(name):
+            bare = cell["numerical (error bars)"] == "-"
+            largest.setdefault(_UNMEASURED if bare else source, []).append(name)
     for source, names in largest.items():
         many = source in (SOURCES[0], _UNMEASURED)
         told = counted(len(names), "output") if many else ", ".join(names)

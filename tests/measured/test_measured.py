@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -350,7 +351,8 @@ def test_samples_of_a_campaign_lie_beside_readings(tmp_path: Path) -> None:
     assert told["within_band"].item() == pytest.approx(found.within.mean())
     notes = " ".join(residual_table([found]).notes)
     assert f"by more than 3.5 sigma: {found.beyond} readings" in notes
-    assert f"{found.within.mean():.2g} of 19 readings lie in it" in notes
+    share = found.within.mean()
+    assert f"{round(19 * share)} of 19 readings ({share:.2g}) lie in it" in notes
 
 
 def test_band_holds_nine_tenths_of_tests_that_the_inputs_foretell(tmp_path: Path) -> None:
@@ -384,9 +386,22 @@ def test_page_of_a_campaign_shows_the_test_beside_its_samples(
     assert done.exit_code == 0, done.output
     text = page.read_text()
     assert 'id="figure-measured"' in text
-    assert "All sensors: 1 of 3 readings" in text
+    assert "All sensors: 3 of 3 readings (1) lie in it" in text
     told = shell.invoke(cli, ["compare", str(folder), str(file)])
-    assert "all sensors: 1 of 3 readings lie in it" in told.output
+    assert "all sensors: 3 of 3 readings (1) lie in it" in told.output
+    page = tmp_path / "dossier.html"
+    done = shell.invoke(cli, ["dossier", str(folder), "--measured", str(file), "--out", str(page)])
+    assert done.exit_code == 0, done.output
+    inside = residual_statistics(residuals(campaign, load_measured(file)))
+    (share,), (most,) = inside["within_band"].values, inside["largest_difference"].values
+    said = " ".join(done.output.split())
+    told = re.findall(
+        r"share of ([\d.]+) of 3 readings in the band of 90 % .*?difference (\S+) deg", said
+    )
+    assert len(told) == 2  # of either standard
+    assert [float(each) for each in told[0]] == pytest.approx([share, most], rel=5e-3)
+    beyond = int(inside["beyond_samples"].sum())
+    assert ("lie beyond all samples (people)" in said) == (beyond > 0)
     drawn = shell.invoke(cli, ["plot", str(folder), "--measured", str(file), "--out", str(folder)])
     assert drawn.exit_code == 0, drawn.output
     assert (folder / "campaign-fig-measured.png").stat().st_size > 10_000
