@@ -38,6 +38,7 @@ RECORD = np.dtype(
     ]
 )  # fmt: skip
 """What is remembered of a whole record; its form is one of ``ringsim.storage.result.pack``."""
+_REMEMBERED = tuple(name for name in RECORD.names or () if name != "place")
 
 
 @dataclass(frozen=True)
@@ -336,6 +337,6 @@ def _verified(path: Path, before: Verified | None) -> Verified:
 
 
 def _told(header: bytes) -> tuple[Any, ...]:
-    """What is remembered of a record, beside its place: a whole result takes three times as long."""
+    """What is remembered of a record beside its place; a whole result takes thrice as long."""
     table = json.loads(header.decode())
-    return tuple(map(table.__getitem__, RECORD.names[1:]))
+    return tuple(map(table.__getitem__, _REMEMBERED))

@@ -13,7 +13,7 @@ from ringsim.campaign.folder import open_folder
 from ringsim.campaign.stopping import merge
 from ringsim.storage import journal as journal_file
 from ringsim.storage.journal import FOLDER, NAME, Journal, read_journal, survey
-from ringsim.storage.result import Result
+from ringsim.storage.result import Result, pack, stacked
 from ringsim.variables import Status
 
 
@@ -160,3 +160,22 @@ def test_merge_and_status_agree_while_a_campaign_runs(bench):
 
 def done(bench):
     return len(finished(bench.folder / "out"))
+
+
+def test_bodies_that_are_unpacked_together_are_those_unpacked_one_by_one():
+    time = np.linspace(0.0, 1.0, 3)
+    runs = [{"time": time, "asynchrony": time * k, "steps": np.array(k)} for k in (1, 1, 2)]
+    bodies = [pack(run)[1] for run in runs]
+    bodies.insert(1, b"")
+    bodies.append(pack({"time": time})[1])
+    places = []
+    for own, arrays in stacked(bodies):
+        places += own
+        for row, place in enumerate(own):
+            alone = Result(0, Status.OK, "", body=bodies[place]).arrays()
+            assert alone.keys() == arrays.keys()
+            for name, values in alone.items():
+                np.testing.assert_array_equal(arrays[name][row], values)
+                assert arrays[name].dtype == values.dtype
+    assert sorted(places) == [0, 2, 3, 4]
+    assert Result(0, Status.OK, "", body=bodies[3]).arrays()["steps"].shape == ()
