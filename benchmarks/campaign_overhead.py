@@ -1,6 +1,6 @@
-"""What a campaign costs beside the simulations: overhead, efficiency, memory, many ranks.
+"""What a campaign costs beside the simulations: overhead, efficiency, many ranks.
 
-python benchmarks/campaign_overhead.py [overhead] [efficiency] [scheduler] [look] [large] [ranks]
+python benchmarks/campaign_overhead.py [overhead] [efficiency] [scheduler] [look] [ranks]
 
 Figures depend on what else the machine does: the load is printed with them.
 """
@@ -155,15 +155,6 @@ def scheduler():
     print(f"busiest rank of 2 while samples of 1 s run: {share:.2%} of a core", flush=True)
 
 
-def large():
-    wall, used, watch = run(100_000, 0.0, "nothing", workers=2)
-    print(
-        f"100,000 no-op samples run and merged in {wall:.0f} s ({used:.0f} s of processor time); "
-        f"largest process {watch.peak / 1e6:.0f} MB, all together {watch.total_peak / 1e6:.0f} MB",
-        flush=True,
-    )
-
-
 def look():
     """Looking at the journals for the first time, and once more."""
     samples, times, angles = 4000, np.linspace(0.0, 60.0, 601), np.linspace(30.0, 180.0, 601)
@@ -199,7 +190,7 @@ def ranks():
     )
 
 
-ALL = {f.__name__: f for f in (overhead, efficiency, scheduler, look, large, ranks)}
+ALL = {f.__name__: f for f in (overhead, efficiency, scheduler, look, ranks)}
 
 if __name__ == "__main__":
     for name in sys.argv[1:] or ALL:

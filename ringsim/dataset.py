@@ -7,8 +7,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsim import build
 from ringsim.files import require_file, whole, writing
@@ -160,3 +162,47 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
             chosen |= {"zlib": True, "complevel": 4, "shuffle": True}
         encoding[str(name)] = chosen
     return encoding
+
+
+# Files of results that are opened: what netCDF4 and xarray keep of them by themselves grows with
+# the samples.
+
+
+_SENTENCES = ("reason", "log", "overrides", "reason_checked")
+_KEPT_BYTES = 8 << 20
+"""What is kept of each variable that was read, unpacked, instead of 64 MiB."""
+_READ_AT_ONCE = 1 << 14
+"""Sentences that are read at once."""
+
+
+def open_lazily(path: Path) -> xr.Dataset:
+    """A file of results as ``xarray.open_dataset`` gives it, but sentences of samples as objects,
+    equal ones once: as text of one width, one long log of a failed run would take as much memory
+    in every sample.
+    """
+    before = netCDF4.get_chunk_cache()
+    netCDF4.set_chunk_cache(_KEPT_BYTES, *before[1:])
+    try:
+        found = xr.open_dataset(path, engine="netcdf4", drop_variables=_SENTENCES)
+    finally:
+        netCDF4.set_chunk_cache(*before)
+    known: dict[str, str] = {}
+    with netCDF4.Dataset(path) as file:
+        for name in _SENTENCES:
+            if name in file.variables and file[name].dimensions == ("sample",):
+                attributes = {key: file[name].getncattr(key) for key in file[name].ncattrs()}
+                found[name] = "sample", _shared(file[name], known), attributes
+        ordered = {name: found[name] for name in file.variables if name in found.data_vars}
+    result = xr.Dataset(ordered, found.coords, found.attrs)
+    result.encoding = found.encoding
+    result.set_close(found.close)
+    return result
+
+
+def _shared(variable: Any, known: dict[str, str]) -> NDArray[np.object_]:
+    """The sentences of a variable over samples, each of which is in memory once."""
+    values = np.full(variable.shape, "", dtype=object)
+    for start in range(0, len(values), _READ_AT_ONCE):
+        part = variable[start : start + _READ_AT_ONCE]
+        values[start : start + _READ_AT_ONCE] = [known.setdefault(text, text) for text in part]
+    return values

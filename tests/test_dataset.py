@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,7 +14,7 @@ from loops import for_each
 from ring_rods import RODS
 
 from ringsim.build import sources
-from ringsim.dataset import save, to_dataset
+from ringsim.dataset import open_lazily, save, to_dataset
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_table, scene_from_toml
@@ -229,3 +231,25 @@ def test_interrupted_write_leaves_the_old_file_and_no_draft(broken, tmp_path, mo
     assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
     with xr.open_dataset(path) as read:
         xr.testing.assert_identical(read.load(), old)
+
+
+def test_long_sentences_of_samples_take_no_room_in_the_others(tmp_path: Path) -> None:
+    log = np.full(50, "", dtype=object)
+    log[7] = "x" * 4000
+    reason = np.full(50, "all V-joints have locked", dtype=object)
+    columns = {"final_time": np.linspace(0.0, 1.0, 50), "log": log, "reason": reason}
+    columns["status"] = np.zeros(50, dtype="i1")
+    made = xr.Dataset({name: ("sample", values) for name, values in columns.items()})
+    made["log"].attrs["long_name"] = "last lines"
+    made.attrs["title"] = "made"
+    made.to_netcdf(tmp_path / "made.nc")
+    before = netCDF4.get_chunk_cache()
+    with open_lazily(tmp_path / "made.nc") as found, xr.open_dataset(tmp_path / "made.nc") as plain:
+        assert netCDF4.get_chunk_cache() == before
+        assert list(found.data_vars) == list(plain.data_vars)
+        assert found.attrs == plain.attrs
+        assert found["log"].attrs == plain["log"].attrs
+        assert found["log"].nbytes + found["reason"].nbytes < 2000
+        assert len({id(text) for text in found["reason"].values}) == 1
+        for name in columns:
+            assert found[name].values.tolist() == plain[name].values.tolist()

@@ -543,10 +543,11 @@ def open_stored(path: Path) -> xr.Dataset:
             elif inside:
                 cure = "no sample has run yet: run ringsim campaign with the same file again"
             raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
-    import xarray as xr  # here, as in other files that runs load: it takes most of a second
+    # Here, as in other files that runs load: it takes most of a second.
+    from ringsim.dataset import open_lazily
 
     try:
-        found = xr.open_dataset(file, engine="netcdf4")
+        found = open_lazily(file)
         if (most := max(found.sizes.values(), default=0)) > _MOST_ENTRIES:
             found.close()
             raise InputError(

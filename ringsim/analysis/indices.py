@@ -458,21 +458,33 @@ def dependence(missing: Mask, columns: Array, block: NDArray[np.int64] | None = 
     if gone in (0, count):
         return np.nan
     chances, least, tests = [], 1.0, 2 * columns.shape[1]
-    for column in columns.T:  # one by one, because all at once take much memory
-        ranks = centred_ranks(column[:, None])
-        for each in (ranks[:, 0], centred_ranks(np.abs(ranks))[:, 0]):
+    normal = list[tuple[float, int, bool]]()
+    for place in range(columns.shape[1]):  # one by one, because all at once take much memory
+        for ends in (False, True):
+            each = _looked_at(columns, place, ends=ends)
             spread = float(each.std(ddof=1)) * np.sqrt((1 - gone / count) / gone)
             if spread == 0.0:
                 continue
             chance = float(2 * scipy.special.ndtr(-abs(float(each[missing].mean())) / spread))
-            if tests * chance < UNLIKELY:
-                chance = max(chance, _as_far(each, missing))
-            least = min(least, chance)
+            normal.append((chance, place, ends))
+    for chance, place, ends in sorted(normal):
+        # Shuffles, of which those of many values take long, can only make a chance larger.
+        if chance >= least:
+            break
+        if tests * chance < UNLIKELY:
+            chance = max(chance, _as_far(_looked_at(columns, place, ends=ends), missing))
+        least = min(least, chance)
     if tests:
         chances.append(tests * least)
     if block is not None:
         chances.append(_clustered(np.bincount(block[missing], minlength=block[-1] + 1), block))
     return min(1.0, len(chances) * min(chances)) if chances else 1.0
+
+
+def _looked_at(columns: Array, place: int, *, ends: bool) -> Array:
+    """Centred ranks of a column, or of the distance from its middle."""
+    ranks = centred_ranks(columns[:, [place]])
+    return (centred_ranks(np.abs(ranks)) if ends else ranks)[:, 0]
 
 
 def _as_far(ranks: Array, missing: Mask) -> float:
@@ -482,12 +494,15 @@ def _as_far(ranks: Array, missing: Mask) -> float:
     off: one sample of n that alone has some value is missing by chance in one case of n.
     """
     values, counts = np.unique(ranks, return_counts=True)
-    shuffled = np.random.default_rng(0).multivariate_hypergeometric(
-        counts, int(missing.sum()), size=int(np.clip(_DRAWN // len(values), 999, _MOST_SHUFFLES)),
-        method="marginals",
-    )  # fmt: skip
-    far = abs(float(ranks[missing].sum())) * (1.0 - 1e-9)
-    return float((np.abs(shuffled @ values) >= far).mean())
+    random, far = np.random.default_rng(0), abs(float(ranks[missing].sum())) * (1.0 - 1e-9)
+    shuffles = int(np.clip(_DRAWN // len(values), 999, _MOST_SHUFFLES))
+    at_once, found = max(1, _DRAWN // len(values)), 0
+    for start in range(0, shuffles, at_once):
+        shuffled = random.multivariate_hypergeometric(
+            counts, int(missing.sum()), size=min(at_once, shuffles - start), method="marginals"
+        )
+        found += int((np.abs(shuffled @ values) >= far).sum())
+    return found / shuffles
 
 
 def _clustered(found: NDArray[np.int64], block: NDArray[np.int64]) -> float:

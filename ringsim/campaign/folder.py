@@ -3,9 +3,10 @@
 import contextlib
 import functools
 import hashlib
+import itertools
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -204,18 +205,22 @@ def _identity(table: Table, attributes: dict[str, Any]) -> str:
 def digests(table: Table, attributes: dict[str, Any]) -> list[str]:
     """Digest of all that decides about the result of each sample of a table, its inputs too."""
     key = _identity(table, attributes).encode()
-    columns = [(f"{column.path} ", column.values) for column in table.columns if column.path]
-    found = []
-    for sample in range(table.samples):
-        own = hashlib.blake2b(key=key, digest_size=8)
-        for path, values in columns:
-            own.update(path.encode())
-            if values.dtype.kind in "biuf":
-                own.update(values[sample].tobytes())
-            else:
-                own.update(json.dumps(plain(values[sample]), sort_keys=True).encode())
-        found.append(own.hexdigest())
-    return found
+    own: list[Iterable[bytes]] = [itertools.repeat(b"", table.samples)]
+    for column in table.columns:
+        if column.path:
+            own += [itertools.repeat(f"{column.path} ".encode()), _each_in_bytes(column.values)]
+    return [
+        hashlib.blake2b(b"".join(parts), key=key, digest_size=8).hexdigest()
+        for parts in zip(*own, strict=False)
+    ]
+
+
+def _each_in_bytes(values: NDArray[Any]) -> Iterator[bytes]:
+    """The values of one sample after the other."""
+    if values.dtype.kind not in "biuf":
+        return (json.dumps(plain(each), sort_keys=True).encode() for each in values)
+    content, size = values.tobytes(), values.nbytes // max(1, len(values))
+    return (content[k * size : (k + 1) * size] for k in range(len(values)))
 
 
 def other_build(old: Folder) -> str:

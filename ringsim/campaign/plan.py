@@ -370,7 +370,7 @@ def status_lines(campaign: Folder) -> list[str]:
             f"  {called:<14} {state}, {counted(told['workers'], 'worker')}, process "
             f"{told['pid']} on {told['host']}, last report {since:.0f} s ago"
         )
-    checks = campaign.survey(checks=True)
+    checks = campaign.survey(checks=True) if running else found
     unfinished = [
         item for item in running.items()
         if (found if item[0] >= 0 else checks).status[sample_of(item[0])] == NOT_RUN

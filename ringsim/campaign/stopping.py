@@ -6,7 +6,7 @@ import os
 import time
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ from ringsim.scene import Scene
 from ringsim.storage import netcdf
 from ringsim.storage.journal import FOLDER, DamagedError, Survey
 from ringsim.storage.netcdf import GO_ON, PER_SAMPLE, OutputTable, locked, provenance
-from ringsim.storage.result import sample_of
+from ringsim.storage.result import sample_of, stacked
 from ringsim.variables import Cause, Fidelity, Status, Variable
 
 # Samples end in any order, and beyond the last look some have run already.  The rule asks only the
@@ -241,7 +241,12 @@ def is_behind(folder: Path) -> bool:
 
 _OF_SAMPLES = ("log", "overrides", "attempts")
 """What is not told of checks."""
-BLOCK_BYTES = 64 << 20
+BLOCK_BYTES = 32 << 20
+"""Numbers of successive samples that are written at once, about."""
+_ROWS = 1 << 14
+"""Successive samples of which numbers of checks are written at once."""
+_READ = 256
+"""Results that are unpacked at once."""
 UNFIT = (
     "its result has another size than those of the first samples: do not vary inputs that change "
     "the size of the result"
@@ -330,22 +335,29 @@ def _add_checks(
 ) -> None:  # fmt: skip
     """Create and fill the variables of the checks."""
     both = {name: v for name, v in wanted.items() if not v.dims and name not in _OF_SAMPLES}
-    blocks = {}
     for name, variable in both.items():
         words = f"{variable.long_name}, of the check with the full engine"
         mine = replace(variable, name=f"{name}{CHECKED}", long_name=words)
         digits = output.significant_digits.get(name)
         netcdf.add_variable(file, mine, compression=output.compression, digits=digits)
-        blocks[name] = netcdf.blank(variable, checks.status.shape)
-    for result in checks.results(np.arange(len(checks.status))):
-        known = {"status": result.status, "cause": result.cause, "reason": result.reason}
-        arrays = result.arrays()
-        arrays |= _derived(own, {n: v[None] for n, v in arrays.items()}, arrays)
-        for name, value in {**arrays, **known}.items():
-            if name in both:
-                blocks[name][sample_of(result.sample)] = np.asarray(value).reshape(())[()]
-    for name, values in blocks.items():
-        file[f"{name}{CHECKED}"][:] = values
+    for part in _parts(len(checks.status), _ROWS):
+        blocks = {n: netcdf.blank(variable, (len(part),)) for n, variable in both.items()}
+        for result in checks.results(np.arange(part.start, part.stop)):
+            known = {"status": result.status, "cause": result.cause, "reason": result.reason}
+            arrays = result.arrays()
+            arrays |= _derived(own, {n: v[None] for n, v in arrays.items()}, arrays)
+            for name, value in {**arrays, **known}.items():
+                if name in both:
+                    place = sample_of(result.sample) - part.start
+                    blocks[name][place] = np.asarray(value).reshape(())[()]
+        for name, values in blocks.items():
+            file[f"{name}{CHECKED}"][part.start : part.stop] = values
+
+
+def _parts(samples: int, most: int) -> Iterator[range]:
+    """All samples in turn, so many at a time."""
+    for start in range(0, samples, most):
+        yield range(start, min(start + most, samples))
 
 
 def _copy(
@@ -360,24 +372,33 @@ def _copy(
     sizes = {dim: d.size for dim, d in file.dimensions.items()}
     shapes = {n: tuple(sizes[dim] for dim in v.dims) for n, v in wanted.items()}
     bytes_each = sum(8 * int(np.prod(shape, dtype=np.int64)) for shape in shapes.values())
-    aligned = max(1, netcdf.CHUNK_BYTES // max(1, bytes_each))
-    count = max(1, BLOCK_BYTES // max(1, bytes_each * aligned)) * aligned
-    for start in range(0, len(found.status), count):
-        stop = min(start + count, len(found.status))
-        blocks = {n: netcdf.blank(v, (stop - start, *shapes[n])) for n, v in wanted.items()}
-        for result in found.results(np.arange(start, stop)):
-            k, fit = result.sample - start, fits[found.form[result.sample]]
-            for name, values in result.arrays().items() if fit else ():
-                if name in blocks:
-                    blocks[name][k] = values[()]  # of text a word, not an array
-            blocks["status"][k] = result.status if fit else Status.ERROR
-            blocks["cause"][k] = result.cause if fit else Cause.UNFIT
-            blocks["reason"][k] = result.reason if fit else UNFIT
-            blocks["log"][k] = result.log
-            blocks["overrides"][k] = result.settings()
-        blocks["attempts"][:] = found.attempts[start:stop]
+    for part in _parts(len(found.status), max(1, BLOCK_BYTES // max(1, bytes_each))):
+        blocks = {n: netcdf.blank(v, (len(part), *shapes[n])) for n, v in wanted.items()}
+        for rows in _parts(len(part), _READ):
+            _fill(blocks, part.start, found, fits, rows)
+        blocks["attempts"][:] = found.attempts[part.start : part.stop]
         axes = {name: file[name][:] for name in file.dimensions if name in file.variables}
         blocks |= _derived(own, blocks, axes)
         for name, values in blocks.items():
             if name in written or name in own:
-                file[name][start:stop] = values
+                file[name][part.start : part.stop] = values
+
+
+def _fill(
+    blocks: Mapping[str, NDArray[Any]], first: int, found: Survey, fits: NDArray[np.bool_],
+    rows: range,
+) -> None:  # fmt: skip
+    """Fill some rows of blocks that begin with the sample ``first`` with what ran of them."""
+    results = list(found.results(first + np.arange(rows.start, rows.stop)))
+    for result in results:
+        k, fit = result.sample - first, fits[found.form[result.sample]]
+        blocks["status"][k] = result.status if fit else Status.ERROR
+        blocks["cause"][k] = result.cause if fit else Cause.UNFIT
+        blocks["reason"][k] = result.reason if fit else UNFIT
+        blocks["log"][k] = result.log
+        blocks["overrides"][k] = result.settings()
+    fitting = [result for result in results if fits[found.form[result.sample]]]
+    for places, arrays in stacked([result.body for result in fitting]):
+        own = [fitting[place].sample - first for place in places]
+        for name in arrays.keys() & blocks.keys():
+            blocks[name][own] = arrays[name]

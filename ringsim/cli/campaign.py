@@ -25,7 +25,7 @@ from ringsim.cli.options import (
 )
 from ringsim.execution.mpi import launched_size
 from ringsim.execution.work import load_solver, solve
-from ringsim.files import MERGED, require_file
+from ringsim.files import require_file
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.balance import rules
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, InputError, show
@@ -90,10 +90,10 @@ def campaign_command(
         # As long as samples are left, a file would be an older one.
         if not plot or len(as_decided(open_folder(folder)).survey().missing):
             return
-        import xarray as xr
+        from ringsim.analysis.design import open_stored
 
-        found = xr.load_dataset(folder / MERGED, engine="netcdf4")
-        draw_figures(found, folder, "campaign", formats)
+        with open_stored(folder) as found:
+            draw_figures(found, folder, "campaign", formats)
 
     if dry_run:
         say = partial(click.echo, err=True)

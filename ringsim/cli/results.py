@@ -25,7 +25,7 @@ from ringsim.cli.options import (
     require_with,
     write_animation,
 )
-from ringsim.dataset import save
+from ringsim.dataset import open_lazily, save
 from ringsim.files import MERGED, require_file, require_place, writing
 from ringsim.refusal import EXIT_DONE, EXIT_NOT_MET, InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
@@ -72,7 +72,7 @@ def merge_command(folder: Path) -> None:
         f"{failed} failed"
     )
     if path is not None:
-        with xr.open_dataset(path) as dataset:
+        with open_lazily(path) as dataset:
             for line in [*notes(dataset), *check_lines(dataset), *verdict_lines(dataset)]:
                 click.echo(f"  {line}")
 

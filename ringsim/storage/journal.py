@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import json
 import logging
 import os
 import secrets
@@ -33,10 +34,11 @@ NAME = "journals-verified.npz"
 RECORD = np.dtype(
     [
         ("place", "i8"), ("sample", "i8"), ("status", "i1"), ("fate", "i1"), ("seconds", "f8"),
-        ("finished", "f8"), ("form", "U16"), ("run_with", "U16"),
+        ("finished", "f8"), ("form", "S16"), ("run_with", "S16"),
     ]
 )  # fmt: skip
 """What is remembered of a whole record; its form is one of ``ringsim.storage.result.pack``."""
+_REMEMBERED = tuple(name for name in RECORD.names or () if name != "place")
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,9 @@ _MAGIC = b"ringsim3"
 _SYNC_SECONDS = 1.0
 """Records are forced to the disk when this much time has passed since the last time: for samples
 longer than that each is, for shorter ones it would cost more than the run."""
+_READ_BYTES = 1 << 20
+_AT_ONCE = 10_000
+"""Records that are held one by one until they become rows of an array, which take a tenth."""
 
 
 class DamagedError(InputError):
@@ -153,39 +158,61 @@ def read_journal(path: Path, place: int = 0) -> Iterator[tuple[int, int, Result 
     None stands for bytes between two records that are no record.  What a writer
     left unfinished at the end is left out: the file may still be growing.
     """
-    with path.open("rb") as file:
+    for begin, end, content in _records(path, place):
+        yield begin, end, None if content is None else Result.from_header(*content)
+
+
+_Content = tuple[bytes, bytes]
+"""Header and body of a record."""
+
+
+def _records(path: Path, place: int) -> Iterator[tuple[int, int, _Content | None]]:
+    """As :func:`read_journal`, with the bytes of the records."""
+    with path.open("rb", buffering=_READ_BYTES) as file:
         size = os.fstat(file.fileno()).st_size
+        file.seek(place)
         while place < size:
-            if (result := _read_record(file, place)) is not None:
-                yield place, file.tell(), result
-                place = file.tell()
+            if (content := _read_content(file, size - place)) is not None:
+                end = file.tell()
+                yield place, end, content
+                place = end
                 continue
             file.seek(place + 1)
-            if (gap := file.read().find(_MAGIC)) < 0:
+            # Beyond that size a writer may have gone on since: it has not left a gap.
+            if (gap := file.read(size - place - 1).find(_MAGIC)) < 0:
                 return
             yield place, place + 1 + gap, None
             place += 1 + gap
+            file.seek(place)
 
 
-def _read_record(file: BinaryIO, place: int) -> Result | None:
-    """The record that begins at a place of a journal; None if there is no whole one."""
-    file.seek(place)
+def _read_content(file: BinaryIO, left: int) -> _Content | None:
+    """The record that begins where a file stands, ``left`` bytes before its end; None if there is
+    no whole one.
+    """
     frame = file.read(_FRAME.size)
     if len(frame) < _FRAME.size:
         return None
     magic, header_size, body_size, expected = _FRAME.unpack(frame)
     # A damaged size must not be believed: it may be more than there is memory.
-    if magic != _MAGIC or file.tell() + header_size + body_size > os.fstat(file.fileno()).st_size:
+    if magic != _MAGIC or _FRAME.size + header_size + body_size > left:
         return None
     header, body = file.read(header_size), file.read(body_size)
-    if checksum(header, body) != expected:
-        return None
-    return Result.from_header(header, body)
+    return (header, body) if checksum(header, body) == expected else None
+
+
+def _read_record(file: BinaryIO, place: int) -> Result | None:
+    """The record that begins at a place of a journal; None if there is no whole one."""
+    file.seek(place)
+    content = _read_content(file, os.fstat(file.fileno()).st_size - place)
+    return None if content is None else Result.from_header(*content)
 
 
 def checksum(header: bytes, body: bytes) -> bytes:
     """Of one record, 16 bytes."""
-    return hashlib.blake2b(header + body, digest_size=16).digest()
+    found = hashlib.blake2b(header, digest_size=16)
+    found.update(body)
+    return found.digest()
 
 
 @dataclass(frozen=True)
@@ -295,14 +322,21 @@ def _verified(path: Path, before: Verified | None) -> Verified:
         return old
     if now.st_size <= old.size:  # it has not grown: somebody else wrote to it
         old = Verified()
-    end, damaged, new = old.end, old.damaged, []
-    for place, after, result in read_journal(path, old.end):
+    end, damaged, parts, new = old.end, old.damaged, [old.records], list[tuple[Any, ...]]()
+    for place, after, content in _records(path, old.end):
         end = after
-        if result is None:
+        if content is None:
             damaged += 1
-        else:
-            codes = result.sample, result.status, result.fate
-            words = result.form, result.run_with
-            new.append((place, *codes, result.seconds, result.finished, *words))
-    records = np.concatenate([old.records, np.array(new, dtype=RECORD)])
+            continue
+        new.append((place, *_told(content[0])))
+        if len(new) == _AT_ONCE:
+            parts.append(np.array(new, dtype=RECORD))
+            new.clear()
+    records = np.concatenate([*parts, np.array(new, dtype=RECORD)])
     return Verified(records, now.st_size, now.st_mtime_ns, end, damaged)
+
+
+def _told(header: bytes) -> tuple[Any, ...]:
+    """What is remembered of a record beside its place; a whole result takes thrice as long."""
+    table = json.loads(header.decode())
+    return tuple(map(table.__getitem__, _REMEMBERED))

@@ -37,6 +37,9 @@ NOT_RUN = -1
 
 CHUNK_BYTES = 1 << 20
 """Size of what is compressed at once, about."""
+CHUNK_ROWS = 1 << 14
+"""Samples that are compressed at once, at most: hundreds of variables have one such piece each in
+memory while they are written."""
 
 PER_SAMPLE = {name: VARIABLES[name] for name in ("status", "cause")} | {
     "reason": Variable("reason", (), "1", "why the run ended so", "str"),
@@ -98,7 +101,7 @@ def add_variable(
     if definition.dtype != "str":
         samples, *shape = (file.dimensions[dim].size for dim in dims)
         row = max(1, math.prod(shape) * np.dtype(definition.dtype).itemsize)
-        rows = max(1, min(samples, CHUNK_BYTES // row))
+        rows = max(1, min(samples, CHUNK_ROWS, CHUNK_BYTES // row))
         options["chunksizes"] = (rows, *(max(1, n) for n in shape))
         if definition.flags is None:  # a missing code has a word like others
             options["fill_value"] = blank(definition, ())[()]
@@ -108,6 +111,9 @@ def add_variable(
             options |= {"significant_digits": digits, "quantize_mode": "GranularBitRound"}
     variable = _create(file, definition, dims, **options)
     variable.set_auto_maskandscale(False)
+    if definition.dtype != "str":
+        # Samples are written in turn, so one piece is enough; the library keeps 64 MiB otherwise.
+        variable.set_var_chunk_cache(size=rows * row, nelems=1)
     if definition.flags is not None:
         flags = flags_of(definition.flags)
         missing = "not_run" if definition.name.startswith("status") else "unknown"

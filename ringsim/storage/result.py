@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -74,19 +74,40 @@ class Result:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """The arrays by name."""
-        found: dict[str, NDArray[Any]] = {}
-        if not self.body:
-            return found
-        content = zlib.decompress(self.body)
-        start = content.index(b"\n") + 1
-        for name, dtype, shape in json.loads(content[:start]):
-            kind = np.dtype(dtype)
-            count = math.prod(shape)
-            planes = np.frombuffer(content, "u1", count * kind.itemsize, start)
-            values = np.ascontiguousarray(planes.reshape(kind.itemsize, count).T)
-            found[name] = values.view(kind).reshape(shape)
-            start += planes.size
-        return found
+        for _, arrays in stacked([self.body]):
+            return {name: values[0, ...] for name, values in arrays.items()}
+        return {}
+
+
+def stacked(bodies: Sequence[bytes]) -> Iterator[tuple[list[int], dict[str, NDArray[Any]]]]:
+    """The arrays of several bodies, all together where they have the same names and shapes.
+
+    Yields the places of such bodies, and their arrays by name with these along a first dimension.
+    """
+    alike: dict[bytes, tuple[list[int], list[bytes]]] = {}
+    for k, body in enumerate(bodies):
+        if body:
+            head, _, planes = zlib.decompress(body).partition(b"\n")
+            places, rows = alike.setdefault(head, ([], []))
+            places.append(k)
+            rows.append(planes)
+    for head, (places, rows) in alike.items():
+        content = np.frombuffer(b"".join(rows), "u1").reshape(len(rows), -1)
+        yield places, _unshuffled(head, content)
+
+
+def _unshuffled(head: bytes, content: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
+    """The arrays that a head describes, from the bytes of several bodies, one in each row."""
+    found: dict[str, NDArray[Any]] = {}
+    start, bodies = 0, len(content)
+    for name, dtype, shape in json.loads(head):
+        kind = np.dtype(dtype)
+        count = math.prod(shape)
+        stop = start + kind.itemsize * count
+        planes = content[:, start:stop].reshape(bodies, kind.itemsize, count)
+        values = np.ascontiguousarray(planes.transpose(0, 2, 1)).view(kind)
+        found[name], start = values.reshape(bodies, *shape), stop
+    return found
 
 
 def check_of(sample: int) -> int:

@@ -11,7 +11,10 @@ import xarray as xr
 from loops import for_each
 
 from campaign_bench import Bench, comparable, journals, lose
+from ringsim.campaign import stopping
+from ringsim.campaign.folder import open_folder
 from ringsim.campaign.specification import load_campaign
+from ringsim.campaign.stopping import merge
 from ringsim.refusal import InputError
 from ringsim.storage.journal import read_journal
 from ringsim.storage.result import check_of, sample_of
@@ -45,6 +48,14 @@ def checked(finished, tmp_path):
 
 def stored(bench):
     return [each.sample for path in journals(bench) for *_, each in read_journal(path)]
+
+
+def test_the_file_does_not_depend_on_how_much_is_written_at_once(checked, monkeypatch):
+    whole = checked.result("out")
+    for name, size in (("_ROWS", 2), ("BLOCK_BYTES", 1), ("_READ", 1)):
+        monkeypatch.setattr(stopping, name, size)
+    merge(open_folder(checked.folder / "out"), execution="", partly=True)
+    xr.testing.assert_equal(checked.result("out"), whole)
 
 
 def test_the_file_holds_the_answers_of_both_engines(checked):

@@ -12,8 +12,8 @@ from campaign_bench import START, assert_same, finished, journals
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.stopping import merge
 from ringsim.storage import journal as journal_file
-from ringsim.storage.journal import FOLDER, NAME, Journal, survey
-from ringsim.storage.result import Result
+from ringsim.storage.journal import FOLDER, NAME, Journal, read_journal, survey
+from ringsim.storage.result import Result, pack, stacked
 from ringsim.variables import Status
 
 
@@ -76,6 +76,25 @@ def test_a_record_that_is_being_written_is_read_when_it_is_whole(tmp_path):
     assert survey(tmp_path, [""] * 3).missing.tolist() == [2]
     journal.path.write_bytes(content)
     assert len(survey(tmp_path, [""] * 3).missing) == 0
+
+
+def test_what_is_written_while_a_journal_is_read_is_no_damage(tmp_path):
+    journal = filled(tmp_path, range(4))
+    journal.close()
+    content = journal.path.read_bytes()
+    journal.path.write_bytes(content[: len(content) * 5 // 8])  # within the third record
+    found = read_journal(journal.path)
+    assert next(found)[2].sample == 0
+    journal.path.write_bytes(content)
+    assert [result.sample for *_, result in found] == [1]
+
+
+def test_what_is_remembered_does_not_depend_on_how_many_records_are_held(tmp_path, monkeypatch):
+    filled(tmp_path, range(7)).close()
+    expected = survey(tmp_path, [""] * 7)
+    journal_file.forget(tmp_path)
+    monkeypatch.setattr(journal_file, "_AT_ONCE", 3)
+    alike(survey(tmp_path, [""] * 7), expected)
 
 
 @pytest.mark.parametrize("how", ["cut", "no zip", "gone"])
@@ -141,3 +160,22 @@ def test_merge_and_status_agree_while_a_campaign_runs(bench):
 
 def done(bench):
     return len(finished(bench.folder / "out"))
+
+
+def test_bodies_that_are_unpacked_together_are_those_unpacked_one_by_one():
+    time = np.linspace(0.0, 1.0, 3)
+    runs = [{"time": time, "asynchrony": time * k, "steps": np.array(k)} for k in (1, 1, 2)]
+    bodies = [pack(run)[1] for run in runs]
+    bodies.insert(1, b"")
+    bodies.append(pack({"time": time})[1])
+    places = []
+    for own, arrays in stacked(bodies):
+        places += own
+        for row, place in enumerate(own):
+            alone = Result(0, Status.OK, "", body=bodies[place]).arrays()
+            assert alone.keys() == arrays.keys()
+            for name, values in alone.items():
+                np.testing.assert_array_equal(arrays[name][row], values)
+                assert arrays[name].dtype == values.dtype
+    assert sorted(places) == [0, 2, 3, 4]
+    assert Result(0, Status.OK, "", body=bodies[3]).arrays()["steps"].shape == ()
