@@ -1,5 +1,6 @@
 """``ringsim merge``, ``analyse``, ``report``, ``dossier``, ``plot``, ``compare``, ``export``."""
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from ringsim.cli.options import (
     require_with,
     write_animation,
 )
-from ringsim.dataset import save
+from ringsim.dataset import require_declared, save
 from ringsim.files import MERGED, require_file, require_place, writing
 from ringsim.refusal import EXIT_DONE, EXIT_NOT_MET, InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
@@ -47,7 +48,16 @@ def opened(path: Path) -> xr.Dataset:
             f"{path}: this campaign is running, and merges its results at its end: wait for "
             f"that, or run ringsim merge {path} for the results so far"
         )
-    return open_stored(path)
+    with warnings.catch_warnings():
+        # Of a file in which they stand twice, which is refused below.
+        warnings.filterwarnings("ignore", "Duplicate dimension", UserWarning)
+        found = open_stored(path)
+    try:
+        require_declared(found, path / MERGED if path.is_dir() else path)
+    except InputError:
+        found.close()
+        raise
+    return found
 
 
 @click.command()
