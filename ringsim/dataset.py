@@ -1,6 +1,9 @@
 """A run as an xarray dataset, and datasets as netCDF files."""
 
+import json
 import platform
+import warnings
+from collections.abc import Hashable
 from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
@@ -16,6 +19,7 @@ from ringsim import build
 from ringsim.files import require_file, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, axes, holds, span_names
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stored_state import layout_fingerprint
 from ringsim.variables import Fidelity, Outcome, Variable, flags_of
@@ -100,6 +104,61 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
         )  # fmt: skip
 
 
+_TEXTS = ("scene", "campaign", "title", "reason", "fidelity", "question", "campaign_name")
+_JSON = ("design", "requirements", "max_difference", "stop_when", "suspects", "outputs")
+"""Attributes of a run or a campaign that are texts, and those that are JSON."""
+
+
+def require_declared(found: xr.Dataset, file: Path) -> None:
+    """Refuse (InputError) a run or a campaign that is not made as its outputs declare it.
+
+    What somebody else has written or changed would otherwise fail wherever it is used first.
+    """
+    if "status" not in found or "scene" not in found.attrs:
+        return
+    cure = "the file is damaged or changed: merge the campaign, or run the scene, again"
+    for name, value in found.attrs.items():
+        if name in (*_TEXTS, *_JSON) and not isinstance(value, str):
+            raise InputError(f"{file}: its attribute {name} must be a text: {cure}")
+        try:
+            _ = json.loads(value) if name in _JSON and value else None
+        except ValueError as error:
+            raise InputError(f"{file}: its attribute {name} is no JSON: {error}: {cure}") from None
+    for name, variable in found.variables.items():
+        if told := _undeclared(str(name), variable, found):
+            raise InputError(f"{file}: {name} {told}: {cure}")
+
+
+def _undeclared(name: str, variable: xr.Variable, found: xr.Dataset) -> str:
+    """What of a stored variable is not as its output declares it; empty if all is."""
+    own = name.removesuffix("_checked").removesuffix("_frame")
+    if (declared := COORDINATES.get(own) or VARIABLES.get(own)) is None:
+        return ""
+    samples = ("sample",) * ("sample" in found.dims and own not in COORDINATES)
+    if variable.dims != (dims := (*samples, *declared.dims)):
+        return f"has the dimensions {_listed(variable.dims)}, must have {_listed(dims)}"
+    text = declared.dtype == "str"
+    if text is not (variable.dtype.kind in "OUS"):
+        return f"must hold {'texts' if text else 'numbers'}"
+    if own in COORDINATES:
+        values = variable.to_numpy()
+        again = len(set(values.tolist())) < len(values)
+        again |= not text and not np.isfinite(values.astype(float)).all()
+        return "holds a value twice, or none" if again else ""
+    # A place that an output tells, such as peak_tension_span, is one that the file has.
+    dim = own.rpartition("_")[2]
+    if declared.dims or dim not in COORDINATES or dim == "time" or dim not in found.coords:
+        return ""
+    known = {*found[dim].to_numpy().tolist(), -1, ""}
+    wrong = [each for each in variable.to_numpy().ravel().tolist() if each == each]
+    wrong = [each for each in wrong if each not in known]
+    return f"holds {wrong[0]}, which is not a {dim} of the file" if wrong else ""
+
+
+def _listed(dims: tuple[Hashable, ...]) -> str:
+    return f"({', '.join(map(str, dims))})"
+
+
 def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.Variable:
     values = np.asarray(values)
     attributes: dict[str, Any] = {"long_name": variable.long_name}
@@ -178,12 +237,15 @@ _READ_AT_ONCE = 1 << 14
 def open_lazily(path: Path) -> xr.Dataset:
     """A file of results as ``xarray.open_dataset`` gives it, but sentences of samples as objects,
     equal ones once: as text of one width, one long log of a failed run would take as much memory
-    in every sample.
+    in every sample.  InputError as of ``require_declared``.
     """
     before = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(_KEPT_BYTES, *before[1:])
     try:
-        found = xr.open_dataset(path, engine="netcdf4", drop_variables=_SENTENCES)
+        with warnings.catch_warnings():
+            # Of a file in which they stand twice, which is refused below.
+            warnings.filterwarnings("ignore", "Duplicate dimension", UserWarning)
+            found = xr.open_dataset(path, engine="netcdf4", drop_variables=_SENTENCES)
     finally:
         netCDF4.set_chunk_cache(*before)
     known: dict[str, str] = {}
@@ -196,6 +258,11 @@ def open_lazily(path: Path) -> xr.Dataset:
     result = xr.Dataset(ordered, found.coords, found.attrs)
     result.encoding = found.encoding
     result.set_close(found.close)
+    try:
+        require_declared(result, path)
+    except InputError:
+        result.close()
+        raise
     return result
 
 

@@ -1,11 +1,13 @@
 """Files: texts and TOML with refusals of one line, and files that appear whole or not at all."""
 
 import contextlib
+import glob
 import os
 import re
 import resource
 import secrets
 import shutil
+import time
 import tomllib
 from collections.abc import Iterator
 from importlib.resources.abc import Traversable
@@ -186,12 +188,27 @@ def _short(path: Path) -> str:
     return told
 
 
+_ABANDONED = 3600.0
+"""Seconds after which a draft that nobody has written to is one whose writer was killed."""
+
+
+def _sweep(path: Path) -> None:
+    """Remove what killed writers of a file have left of it."""
+    for draft in path.parent.glob(f".{glob.escape(path.name)}.*{DRAFT}"):
+        with contextlib.suppress(OSError):
+            if time.time() - draft.stat().st_mtime > _ABANDONED:
+                draft.unlink()
+
+
 @contextlib.contextmanager
 def whole(path: Path, *, lasting: bool = True) -> Iterator[Path]:
     """A draft to write to; it replaces ``path`` once it is complete.
 
-    A lasting file is on the disk by then, so that it survives a power cut as well.
+    A lasting file is on the disk by then, so that it survives a power cut as well; drafts that
+    others of its name have left are removed.
     """
+    if lasting:
+        _sweep(path)
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}{DRAFT}")
     try:
         draft.touch()  # tells why a folder refuses a file, in better words than HDF5

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from ringsim.layout.layout import layout_of
 from ringsim.outputs.recorder import FORMAT, StoredState
 from ringsim.refusal import InputError, show
 from ringsim.scene import Scene, scene_from_toml
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _SAME = 1e-6
 """Relative difference of two times that count as the same: more digits are seldom typed."""
@@ -69,13 +72,26 @@ def read_state(path: str | Path, at: float | None = None) -> StoredState:
     try:
         with xr.open_dataset(path, engine="netcdf4") as opened:
             data = opened.load()
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be read as netCDF: {error}") from None
     if "state" not in data:
         raise InputError(
             f"{path}: has no stored states: run its scene again with --set "
             "record.state_interval=1 (or another number of seconds)"
         )
+    try:
+        return _chosen(data, path, at)
+    except InputError:
+        raise
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{path}: its states cannot be read: {type(error).__name__}: {error}: the file is "
+            "damaged or changed: run its scene again"
+        ) from None
+
+
+def _chosen(data: "xr.Dataset", path: Path, at: float | None) -> StoredState:
+    """The state of a time in a run's dataset, unpacked once to see that it can be."""
     state, times = data["state"], data["state_time"].to_numpy()
     if int(state.attrs["format"]) != FORMAT:
         raise InputError(
@@ -97,11 +113,13 @@ def read_state(path: str | Path, at: float | None = None) -> StoredState:
     numbers = state.to_numpy()
     cuts = [0, *data["state_begin"].to_numpy().tolist(), len(numbers)]
     form, own = str(data["state_form"].to_numpy()[number]), slice(*cuts[number + 1 : number + 3])
-    return StoredState(
+    found = StoredState(
         source=str(path), time=float(times[number]), engine=str(state.attrs["engine"]),
         scene=scene, packed=(form, numbers[own]),
         packed_history=(str(state.attrs["history"]), numbers[: cuts[1]]),
     )  # fmt: skip
+    _ = found.memory, found.history
+    return found
 
 
 def _told(times: np.ndarray[Any, Any]) -> str:

@@ -14,7 +14,7 @@ from loops import for_each
 from ring_rods import RODS
 
 from ringsim.build import sources
-from ringsim.dataset import open_lazily, save, to_dataset
+from ringsim.dataset import open_lazily, require_declared, save, to_dataset
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_table, scene_from_toml
@@ -201,6 +201,46 @@ def test_arrays_that_do_not_fit_are_refused(values, message):
     outcome = Outcome(Status.OK, "", {"time": TIMES}, values)
     with pytest.raises(ValueError, match=message):
         to_dataset(outcome, scene_of())
+
+
+def sound_run() -> xr.Dataset:
+    """A run whose places are among those of its coordinates."""
+    return to_dataset(failed_outcome(), scene_of()).assign_coords(section=[1, 2, 3, 4])
+
+
+@for_each(
+    ("change", "message"),
+    [
+        (lambda run: run, ""),
+        (lambda run: run.assign(lock_time=("other", np.zeros(8))), r"lock_time has the dim.*other"),
+        (lambda run: run.assign(lock_time=run.lock_time.T), r"\(section, plane\), must have"),
+        (lambda run: run.assign(steps="many"), "steps must hold numbers"),
+        (lambda run: run.assign(asynchrony_leader_plane=3), "asynchrony_leader_plane must hold te"),
+        (lambda run: run.assign(asynchrony_leader_section=9), "holds 9, which is not a section"),
+        (lambda run: run.assign_coords(section=[1, 1, 2, 3]), "section holds a value twice"),
+        (lambda run: run.assign_attrs(title=3), "its attribute title must be a text"),
+        (lambda run: run.assign_attrs(requirements="{"), "its attribute requirements is no JSON"),
+    ],
+)
+def test_a_run_that_is_not_as_declared_is_refused_with_what_is_wrong(change, message):
+    run = change(sound_run())
+    if not message:
+        require_declared(run, Path("run.nc"))
+        return
+    with pytest.raises(
+        InputError, match=rf"run\.nc: .*{message}.*: the file is damaged or changed"
+    ):
+        require_declared(run, Path("run.nc"))
+
+
+def test_drafts_of_killed_writers_are_removed_and_those_of_living_ones_kept(tmp_path):
+    old, young, other = (tmp_path / f".{n}.draft" for n in ("run.nc.1", "run.nc.2", "ran.nc.1"))
+    for draft in (old, young, other):
+        draft.touch()
+    for draft in (old, other):
+        os.utime(draft, (1e9, 1e9))
+    save(to_dataset(failed_outcome(), scene_of()), tmp_path / "run.nc")
+    assert sorted(tmp_path.iterdir()) == sorted([tmp_path / "run.nc", young, other])
 
 
 def test_missing_folder_is_refused_with_its_name(tmp_path):

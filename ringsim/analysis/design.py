@@ -568,7 +568,7 @@ def open_stored(path: Path) -> xr.Dataset:
         raise InputError(f"{file}: {cure}") from None
     except (InputError, UnicodeEncodeError):  # the latter of the file's name, see ringsim.cli
         raise
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RuntimeError) as error:
         if file.suffix == ".toml":
             raise InputError(
                 f"{file}: this is an input file without results: give the folder that ringsim "

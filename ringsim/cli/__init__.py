@@ -85,6 +85,14 @@ class _Verbs(click.Group):
         except (InputError, NotBuiltError) as error:
             click.echo(str(error), err=True)
             ctx.exit(EXIT_BAD_INPUT)
+        except RuntimeError as error:
+            # Series are read where they are used: what is damaged in them shows there.
+            if not str(error).startswith("NetCDF: "):
+                raise
+            told = "a netCDF file cannot be read to its end"
+            cure = "it is damaged: merge the campaign, or run the scene, again"
+            click.echo(f"ringsim: {told}: {error.args[0]}: {cure}", err=True)
+            ctx.exit(EXIT_BAD_INPUT)
         except UnicodeEncodeError as error:
             if sys.getfilesystemencoding() == "utf-8":
                 raise

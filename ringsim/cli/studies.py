@@ -143,8 +143,8 @@ def accuracy_command(
     from ringsim.analysis.study import evidence_of
     from ringsim.campaign.studies import ReferenceRunError, run_ladder
     from ringsim.dataset import save
+    from ringsim.plots.figures import write
     from ringsim.plots.studies import accuracy
-    from ringsim.plots.style import write
 
     try:
         cores = workers or len(os.sched_getaffinity(0))
@@ -224,14 +224,14 @@ def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float
     from ringsim.analysis.stability import WRONG, summary, to_markdown
     from ringsim.campaign.studies import run_check, run_map
     from ringsim.dataset import save
-    from ringsim.plots import style
+    from ringsim.plots.figures import write
     from ringsim.plots.studies import stability
 
     whole = run_map(folder, panels, workers)
     # The same seed at every resumption, so that the same cells are checked.
     whole = run_check(folder, panels, whole, share=0.01 * percent, seed=1, workers=workers)
     save(whole, folder / "stability.nc")
-    style.write(stability(whole), folder / "stability.png")
+    write(stability(whole), folder / "stability.png")
     write_text(folder / "stability.md", to_markdown(whole))
     click.echo(summary(whole))
     for name in ("stability.nc", "stability.png", "stability.md"):

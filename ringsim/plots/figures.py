@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ringsim.analysis.courses import any_finite
 from ringsim.choice import load_package
-from ringsim.files import writing
+from ringsim.files import whole, writing
 from ringsim.plots import NO_JOINTS, Picture, barred, jointed, known, style
 
 load_package("ringsim.plots")
@@ -94,5 +94,12 @@ def write_figure(
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for path in written:
-            style.write(figure, path)
+            write(figure, path)
     return written
+
+
+@style.styled
+def write(figure: Figure, path: Path) -> None:
+    """Write a file of the kind that its name tells: png, svg or pdf; whole, or not at all."""
+    with whole(path, lasting=False) as draft:
+        figure.savefig(draft, format=path.suffix[1:])

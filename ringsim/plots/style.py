@@ -521,12 +521,6 @@ def as_png(figure: Figure) -> bytes:
     return held.getvalue()
 
 
-@styled
-def write(figure: Figure, path: Path) -> None:
-    """Write a file of the kind that its name tells: png, svg or pdf."""
-    figure.savefig(path)
-
-
 # A figure as text for an HTML page: SVG where it is light, PNG where it is not.
 
 

@@ -57,7 +57,7 @@ class Verified:
 def recall(folder: Path) -> dict[str, Verified]:
     """What was verified in a campaign's folder, by name of journal."""
     # Lost or damaged it costs the time to read the journals, so that no fault of it counts.
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, BadZipFile):
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):
         with (folder / NAME).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             if file["records"].dtype != RECORD:
                 return {}

@@ -62,6 +62,12 @@ def test_samples_of_damaged_records_run_again(damage, left, copied, whole):
     xr.testing.assert_identical(comparable(copied.result("out")), comparable(whole.result("out")))
 
 
+def test_an_empty_note_of_what_was_verified_costs_nothing_but_time(copied):
+    """As a full disk or a power cut leaves it."""
+    empty(copied.folder / "out" / "journals-verified.npz")
+    assert "20 of 20 samples done" in copied.run("status", "out")
+
+
 def test_merge_of_an_unfinished_campaign_has_gaps(copied):
     lose(copied, range(8))
     assert "8 not run" in copied.run("merge", "out")

@@ -207,6 +207,12 @@ def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:
         InputError, match=r"--at 0.015: .* it has 0.01, 0.02, 0.03 s: take --at 0.0[12]"
     ):
         read_state(file, 0.015)
+    changed = tmp_path / "changed.nc"
+    run = xr.load_dataset(file)
+    for other in (run.assign_attrs(scene=3), run.isel(state_entry=slice(3))):
+        other.to_netcdf(changed)
+        with pytest.raises(InputError, match=r"changed\.nc: .*damaged or changed"):
+            read_state(changed)
     ended = _ended(tmp_path)
     with pytest.raises(InputError, match="unchanged: start from an earlier state"):
         simulate(ended.scene, start=ended)

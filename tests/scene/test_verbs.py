@@ -184,6 +184,40 @@ def test_an_interrupted_run_writes_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+EARLY = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class Interrupted:
+    def find_spec(self, name, path, target=None):
+        if name == "click":
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Interrupted())
+from ringsim.__main__ import main
+main()
+"""
+
+
+@pytest.mark.quick
+def test_a_command_interrupted_while_it_loads_says_so_in_one_line() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", EARLY], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    "error",
+    ["MemoryError()", "ImportError('libz.so.1: failed to map segment from shared object')"],
+)
+def test_too_little_memory_is_told_in_one_line(error: str) -> None:
+    code = EARLY.replace("signal.raise_signal(signal.SIGINT)", f"raise {error}")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("there is too little memory: raise the limit (ulimit -v)")
+    assert len(done.stderr.splitlines()) == 1
+
+
 @pytest.mark.quick
 def test_a_shell_completes_paths_after_set() -> None:
     def offered(begun: str) -> list[str]:
