@@ -3,7 +3,7 @@
 import json
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -128,22 +128,30 @@ def margins_once_on(campaign: xr.Dataset) -> NDArray[np.float64]:
     of all is that of a time before; NaN elsewhere.
     """
     found = np.full(campaign.sizes["sample"], np.nan)
-    for sample in np.flatnonzero(good(campaign)).tolist() if "reason" in campaign else ():
-        for remark in str(campaign["reason"].values[sample]).split("; ")[1:]:
-            if (late := _LATE.match(remark)) and late[2]:
-                found[sample] = float(late[2])
+    for sample, late in _late_starts(campaign):
+        found[sample] = float(late[2] or "nan")
     return found
+
+
+def _late_starts(campaign: xr.Dataset) -> Iterator[tuple[int, re.Match[str]]]:
+    """The places of the samples whose least margin is that of a time before a winch starts, with
+    what their runs say of it.
+    """
+    if "reason" not in campaign:
+        return
+    reasons = campaign["reason"].to_numpy()
+    for sample in np.flatnonzero(good(campaign)).tolist():
+        for remark in str(reasons[sample]).split("; ")[1:]:
+            if late := _LATE.match(remark):
+                yield sample, late
 
 
 def late_line(campaign: xr.Dataset) -> str:
     """In how many samples the least drive margin is that of a time before a winch starts, and the
     least of all samples from that start on; empty if in none.
     """
-    found, held = list[tuple[float, int, re.Match[str]]](), good(campaign)
-    for sample in np.flatnonzero(held).tolist() if "reason" in campaign else ():
-        for remark in str(campaign["reason"].values[sample]).split("; ")[1:]:
-            if late := _LATE.match(remark):
-                found.append((float(late[2] or "inf"), sample, late))
+    held = good(campaign)
+    found = [(float(late[2] or "inf"), sample, late) for sample, late in _late_starts(campaign)]
     if not found:
         return ""
     least, sample, late = min(found, key=lambda each: each[:2])

@@ -326,17 +326,19 @@ def given_data_indices(bins: Bins, outputs: Array) -> Array:
     """Indices of a column with many outputs, shape (samples, outputs), of which none is missing;
     each less its mean, and the sum of its squares is 1.
     """
-    steps = (bins.bin == np.unique(bins.bin)[:, None]).astype(float)
-    number = steps.sum(axis=1, keepdims=True)
-    lines = steps * (bins.place - steps @ bins.place[:, None] / number)
-    spread = (lines**2).sum(axis=1, keepdims=True)
-    sloped = spread[:, 0] > _NO_LINE
-    # Functions whose squares sum up to 1, none of which tells anything of another.
-    terms = np.concatenate([steps / np.sqrt(number), lines[sloped] / np.sqrt(spread[sloped])])
-    spare = len(outputs) - len(terms)
+    order = np.argsort(bins.bin, kind="stable")
+    number = np.unique(bins.bin, return_counts=True)[1]
+    starts, y, x = np.cumsum(number) - number, outputs[order], bins.place[order]
+    x = x - np.repeat(np.add.reduceat(x, starts) / number, number)
+    spread = np.add.reduceat(x * x, starts)
+    sloped = spread > _NO_LINE
+    spare = len(outputs) - len(number) - int(sloped.sum())
     if spare < 1:
         return np.full(outputs.shape[1], np.nan)
-    explained = ((terms @ outputs) ** 2).sum(axis=0)
+    # A step and a line a bin, none of which tells anything of another.
+    means = np.add.reduceat(y, starts) ** 2 / number[:, None]
+    slopes = np.add.reduceat(x[:, None] * y, starts)[sloped] ** 2 / spread[sloped, None]
+    explained = means.sum(axis=0) + slopes.sum(axis=0)
     return np.asarray(1 - (1 - explained) * (len(outputs) - 1) / spare)
 
 
@@ -496,6 +498,12 @@ def _as_far(ranks: Array, missing: Mask) -> float:
     values, counts = np.unique(ranks, return_counts=True)
     random, far = np.random.default_rng(0), abs(float(ranks[missing].sum())) * (1.0 - 1e-9)
     shuffles = int(np.clip(_DRAWN // len(values), 999, _MOST_SHUFFLES))
+    few = min(int(missing.sum()), len(missing) - int(missing.sum()))
+    if len(values) > few:
+        # Centred ranks of all add up to 0: those that are left are as far, to the other side.
+        drawn = (random.choice(len(ranks), few, replace=False, shuffle=False)
+                 for _ in range(shuffles))  # fmt: skip
+        return sum(abs(float(ranks[own].sum())) >= far for own in drawn) / shuffles
     at_once, found = max(1, _DRAWN // len(values)), 0
     for start in range(0, shuffles, at_once):
         shuffled = random.multivariate_hypergeometric(

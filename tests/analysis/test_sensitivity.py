@@ -230,6 +230,18 @@ def test_the_gate_of_an_input_of_two_values_is_fishers_exact_test(both, lost, ra
     assert found == pytest.approx(2 * exact, rel=0.1 if exact > 1e-3 else 0.4)
 
 
+def test_the_gate_of_an_input_of_many_values_is_the_rank_sum_test():
+    """Of few that are missing, and of few that are not; 999 shuffles or more."""
+    random = np.random.default_rng(3)
+    x = np.sort(random.random(60))
+    for own in ([0, 1, 3, 9, 20], [2, 5, 8, 11, 30, 31, 40]):
+        missing = np.isin(np.arange(60), own)
+        exact = scipy.stats.mannwhitneyu(x[missing], x[~missing], method="exact").pvalue
+        for lost in (missing, ~missing):
+            found = indices._as_far(indices.centred_ranks(x[:, None])[:, 0], lost)
+            assert found == pytest.approx(exact, abs=4 * np.sqrt(exact / 16_000))
+
+
 def test_the_gate_shuts_by_chance_as_seldom_where_inputs_are_seldom_other_than_usual():
     random = np.random.default_rng(12)
     shut = []
