@@ -17,8 +17,11 @@ from ringsim.analysis.design import (
     REACHED,
     UNKNOWN,
     blocks_of,
+    called,
     drawn,
+    endings,
     endings_of,
+    inputs,
     kinds_of_ends,
     learnt_lines,
 )
@@ -28,6 +31,7 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import DOUBT, may_be_off
+from ringsim.sampling.distributions import labels_of
 from ringsim.tables import (
     Table,
     chance_text,
@@ -105,7 +109,7 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
         for remark in str(reasons[sample]).split("; ")[1:]:
             if may_be_off(f"; {remark}")[0] or _LATE.match(remark):
                 continue
-            remark = remark.replace("start 1: ", "first attempt: ", 1)
+            remark = remark.replace("start 1: ", "first attempt, not used: ", 1)
             if remark.count(")") > remark.count("("):  # which the words before it have opened
                 remark = remark.removesuffix(")")
             kind = _NUMBER.sub("#", _PLACES.sub("#", remark))
@@ -121,6 +125,23 @@ _LATE = re.compile(
     r"the least drive margin is that of .* before (\S+ starts at .*?)"
     r"(?:: from then on (\S+) (at .*))?$"
 )
+
+
+def reached_by_words(campaign: xr.Dataset, start: str) -> list[str]:
+    """How many samples reached their goal with each word that was drawn of inputs whose paths begin
+    so, as "deployed with none: 37 of 37".
+    """
+    held, words, lines = ran(campaign), endings(campaign), list[str]()
+    goal = next((word for word in REACHED if (words == word).any()), REACHED[0])
+    for name in inputs(campaign):
+        values = campaign[name].to_numpy()
+        if not called(campaign[name]).startswith(start) or values.dtype.kind not in "OU":
+            continue
+        told = labels_of(values) if values.ndim == 1 else values
+        for word in sorted(set(told[held].ravel().tolist())) if told.ndim == 1 else ():
+            own = held & (told == word)
+            lines.append(f"{goal} with {word}: {int((own & (words == goal)).sum())} of {own.sum()}")
+    return lines
 
 
 def margins_once_on(campaign: xr.Dataset) -> NDArray[np.float64]:
@@ -225,6 +246,9 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 if variable.error_bar and "+-" not in told:
                     bar, error = _of_others(sound, variable)
                     unknown |= not error
+                    if not error:  # more digits would say that they are known
+                        raw = float(values[variable.name])
+                        number = number_text(readable(variable.units, raw)[0] * raw, 4)
                     number = known_to(number, readable(variable.units, bar)[0] * bar)
                 said = " ".join([number, *told])
                 error += _checked(worst, variable)

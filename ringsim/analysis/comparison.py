@@ -244,7 +244,8 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
     """Differences of all outputs of two campaigns, or of two runs, second minus first.
 
     Returns for every output NAME that both have ``NAME_mean`` (side), ``NAME_difference``,
-    ``NAME_difference_interval`` (bound), ``NAME_samples`` (side) in its unit, and for pairs
+    ``NAME_difference_interval`` (bound), ``NAME_numerical_error`` (side; root mean square of error
+    bars, NaN without), ``NAME_samples`` (side) in its unit, and for pairs
     ``NAME_largest_difference`` with ``NAME_largest_difference_sample`` and
     ``NAME_rank_correlation`` of both (NaN of few pairs, and where either side hardly differs
     between samples) and ``NAME_spread`` (side), and ``NAME_doubtful`` (side), in how many samples
@@ -522,6 +523,11 @@ def _output(
         "difference": ((), means[1] - means[0], "second minus first"),
         "difference_interval": ("bound", np.array(ends), "interval of 95 % of the difference"),
         "samples": ("side", np.array([len(each) for each in used]), "samples compared"),
+        "numerical_error": (
+            "side",
+            np.array([_bar_of(each, name) for each in both]),
+            "root mean square of the error bars",
+        ),
     }
     if len(pairs.first):
         rows["largest_difference"] = (), largest, "largest difference of a pair"
@@ -537,6 +543,13 @@ def _output(
         plain = np.asarray(each).dtype.kind != "f" or word == "rank_correlation"
         found[f"{name}_{word}"] = dims, each, about(f"{words}: {meaning}", "1" if plain else units)
     return found
+
+
+def _bar_of(campaign: xr.Dataset, name: str) -> float:
+    """Root mean square of the error bars of an output; NaN without any."""
+    bars = numbers(campaign, f"{name}_error")[good(campaign)]
+    known = bars[np.isfinite(bars)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
 def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any]:

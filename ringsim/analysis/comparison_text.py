@@ -1,6 +1,6 @@
 """A comparison of two campaigns or runs as tables: for terminals and pages alike."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import xarray as xr
@@ -150,9 +150,9 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
         elif together < _LOW:
             apart[name] = together
     for some, sense in (
-        (turned, "turn round: samples that are the worst in one are the best in the other"),
+        (turned, "turn round: samples that are bad in one are good in the other"),
         (tend, "tend to turn round: samples that are bad in one are rather good in the other"),
-        (apart, "hardly go together: the worst samples of one are not those of the other"),
+        (apart, "go together little: one tells little of which samples of the other are bad"),
     ):
         if some:
             named = ", ".join(f"{name} ({each:+.2f})" for name, each in some.items())
@@ -274,6 +274,24 @@ def _limits(found: xr.Dataset) -> Table:
     return Table(("limit", *heads), rows, left=1)
 
 
+def _numerical(found: xr.Dataset, names: Iterable[str]) -> list[str]:
+    """Which differences numerical errors may have made, as far as error bars tell."""
+    within, known = list[str](), False
+    for name in names:
+        errors = found[f"{name}_numerical_error"].values
+        known |= bool(np.isfinite(errors).any())
+        size, apart = float(np.sqrt(np.nansum(errors**2))), abs(found[f"{name}_difference"].item())
+        if np.isfinite(errors).any() and apart <= size:
+            factor, unit = readable(quantities()[name].units, size)
+            within.append(f"{name} ({with_unit(number_text(factor * size, 2), unit)})")
+    if not known:
+        return ["numerical errors are not measured in either (error_bars_every), and not counted"]
+    told = "differences within the numerical errors of both (from error bars)"
+    return [f"{told}: {', '.join(within)}"] * bool(within) + [
+        "intervals are of sampling alone; numerical errors that both share cancel"
+    ]
+
+
 def _changed(found: xr.Dataset) -> Table:
     """The pairs whose outcome is another one."""
     changed, pairs = found.sizes["change"], found.attrs["pairs"]
@@ -340,7 +358,7 @@ def _outputs(found: xr.Dataset) -> Table:
     )  # fmt: skip
     columns = 8 if found.attrs["runs"] else len(head)
     same = "the same in both" if found.attrs["runs"] else "the same in each pair"
-    notes = [f"{same}: {', '.join(alike)}"] * bool(alike)
+    notes = [f"{same}: {', '.join(alike)}"] * bool(alike) + _numerical(found, [r[0] for r in rows])
     for name, side in zip(names_of(found), ("first", "second"), strict=True):
         only = found.attrs[f"only_{side}"]
         notes += [f"in {name} alone: {only}"] * bool(only)

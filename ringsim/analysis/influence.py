@@ -145,15 +145,17 @@ def confounding_notes(analysis: xr.Dataset, told: Collection[str]) -> list[str]:
     ]  # fmt: skip
     if not found:
         return []
+    shares = [f"{share:.0%}, " * bool(np.isfinite(share)) for *_, share in found]
     named = ", ".join(
-        f"{first} with {second} ({share:.0%}, r = {correlation:+.2f})"
-        for first, second, correlation, share in found[:_NAMED]
+        f"{first} with {second} ({share}r = {correlation:+.2f})"
+        for (first, second, correlation, _), share in zip(found[:_NAMED], shares, strict=False)
     )
+    of = "share of the variance of one that the other explains, rank correlation"
     more = f" and {counted(len(found) - _NAMED, 'other pair')}" * (len(found) > _NAMED)
     return [
-        "these inputs are correlated in the samples, more than by chance (share of the variance "
-        f"of one that the other explains, rank correlation): {named}{more}, so that the effect "
-        f"of one may be taken for that of the other: {analysis['pair_correlation'].attrs['cure']}"
+        "these inputs are correlated in the samples, more than by chance "
+        f"({of if any(shares) else 'rank correlation'}): {named}{more}, so that the effect of one "
+        f"may be taken for that of the other: {analysis['pair_correlation'].attrs['cure']}"
     ]
 
 

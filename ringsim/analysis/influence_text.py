@@ -396,7 +396,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
     asked = analysis["requirement"].values.tolist() if "requirement" in analysis.dims else []
     if near := [name for name in asked if np.isfinite(analysis.get(f"{name}_same_within", np.nan))]:
         told = ", ".join(near)
-        notes.append(f"not told, because samples differ by less than their numerical error: {told}")
+        why = "no sample is farther from the mean than the numerical error"
+        notes.append(f"not told, because {why}: {told}")
     if quiet:
         notes.append(f"no significant input for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]

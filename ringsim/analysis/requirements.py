@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -96,6 +96,15 @@ class Requirement(Model):
         """How far values are beyond what is allowed, in their unit; NaN without a value."""
         each = [kind.beyond(values, bound) for kind, bound in self.given]
         return np.asarray(np.maximum.reduce(each))
+
+
+def doubt_of(name: str, keys: Sequence[str]) -> str:
+    """Why bounds of an output are on the side on which nothing is wrong; empty if they are not."""
+    worse = quantities()[name].worse if name in quantities() else "neither"
+    meant = {("larger", "min"): "max", ("smaller", "max"): "min"}
+    if len(keys) != 1 or (worse, keys[0]) not in meant:
+        return ""
+    return f"doubtful: {worse} values are the worse ones: is {meant[worse, keys[0]]} meant?"
 
 
 def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.measured import Measurement, Readings
-from ringsim.outputs.family import VARIABLES, axes, holds
+from ringsim.outputs.family import VARIABLES, axes, holds, supply
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
@@ -142,7 +142,7 @@ def check_sensors(measurement: Measurement, scene: Scene) -> None:
         if absent := sorted(set(VARIABLES[sensor.variable].needs) - has):
             raise InputError(
                 f"sensor {sensor.name}: runs of this scene do not have {sensor.variable}, because "
-                f"the scene has no {absent[0]}: leave the sensor out, or add that to the scene"
+                f"the scene has no {absent[0]}: leave the sensor out, or {supply(absent[0])}"
             )
         for dim, label in sensor.place.items():
             labels = known[dim].tolist() if dim in known else [label]

@@ -360,20 +360,30 @@ def _causes(whole: xr.Dataset) -> str:
     others = whole.isel(cell=(whole["verdict"] != OK).values)
     causes, reasons = (others[name].values.astype(str) for name in ("cause", "reason"))
     words, first, counts = np.unique(causes, return_index=True, return_counts=True)
-    rows = [
-        [words[k] or WRONG, counts[k], _shortened(reasons[first[k]], _LONGEST_REASON)]
-        for k in np.argsort(-counts, kind="stable")
-    ]
+    rows = []
+    for k in np.argsort(-counts, kind="stable").tolist():
+        # What is wrong though its run says nothing: by how much a finer run has another number.
+        apart = "" if words[k] else _differences(others.isel(cell=int(first[k])))
+        told = f"from a finer run: {apart}" if apart else reasons[first[k]]
+        rows.append([words[k] or WRONG, counts[k], _shortened(told, _LONGEST_REASON)])
     return markdown_table(["cause", "cells", "for example"], rows)
+
+
+def _differences(cell: xr.Dataset) -> str:
+    """By how much a cell differs from a finer run, where that is more than is allowed."""
+    told = []
+    for name, allowed in PROMISES.items():
+        apart = float(cell[name]) if name in cell else np.nan
+        if apart > allowed:
+            factor, unit = (1.0, "deg") if name == "angle_difference" else (100.0, "%")
+            ends = f"{factor * apart:.2g} {unit} (allowed {factor * allowed:g} {unit})"
+            told.append(f"{name.partition('_')[0]} differs by {ends}")
+    return ", ".join(told)
 
 
 def _cell(whole: xr.Dataset, number: int) -> str:
     cell = whole.isel(cell=number, group=int(whole["of_group"][number]))
-    differences = ", ".join(
-        f"{name.replace('_', ' ')} {float(cell[name]):.2g}"
-        for name in PROMISES
-        if name in cell and np.isfinite(float(cell[name]))
-    )
+    differences = _differences(cell)
     return (
         f"- {cell['name'].values}: {cell['x_label'].values} = {float(cell['x']):g}, "
         f"{cell['y_label'].values} = {float(cell['y']):g}: {cell['reason'].values} "

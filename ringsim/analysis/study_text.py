@@ -366,7 +366,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         if np.isfinite(bar):
             inside = f", mean {fine_text(mean, fine)}" * bool(np.isfinite(mean))
             told = f"{fine_text(least, fine)} .. {fine_text(most, fine)} {units}".rstrip()
-            within.append(f"{name} {told}{inside}, error bar {bar:.2g}")
+            within.append(f"{name} {told}{inside}, median error bar {bar:.2g}")
         if np.isfinite(least) and (every or np.isnan(bar) or name in wanted):
             low, high = (factor * analysis[f"{name}_interval"].values[0]).tolist()
             scatters = np.isfinite(analysis[f"{name}_error_of_mean"].values[0])
@@ -385,8 +385,11 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     if any(row[-2] == "-" for row in rows):
         notes.append("no worst sample of outputs of which nothing says which end is worse")
     if within:
-        notes.append(f"differ by less than their numerical error: {'; '.join(within)}")
+        notes.append(f"{_WITHIN}: {'; '.join(within)}")
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
+
+
+_WITHIN = "no sample is farther from the mean than the numerical error"
 
 
 def too_few() -> str:

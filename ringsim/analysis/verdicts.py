@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ringsim.analysis.campaign_notes import doubtful, marked
+from ringsim.analysis.campaign_notes import LATE, doubtful, marked
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import (
     Interval,
@@ -26,7 +26,14 @@ from ringsim.analysis.intervals import (
     share_bounds,
     standard_error,
 )
-from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
+from ringsim.analysis.requirements import (
+    KINDS,
+    OUTCOME,
+    Requirement,
+    doubt_of,
+    require_values,
+    violations,
+)
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
 from ringsim.refusal import known_or_nearest
@@ -417,6 +424,11 @@ def verdict_table(analysis: xr.Dataset) -> Table:
                 f"{name}: {short} of the {held} samples that meet it ended before the antenna was "
                 f"deployed, and might have violated it later{hint}"
             )
+        signs = [kind.key for kind in KINDS if f" {kind.sign} " in one["requirement_text"]]
+        if doubt := doubt_of(name, signs):
+            notes.append(f"{one['requirement_text']}: {doubt}")
+        if (late := analysis.attrs.get(LATE)) and name == "least_drive_margin":
+            notes.append(f"{name}: {late}")
         if missing := one["samples_without_value"]:
             notes.append(
                 f"{name}: violations without a value (the antenna did not get that far): {missing}"

@@ -520,7 +520,9 @@ def margin_table(analysis: xr.Dataset) -> Table:
     notes = [
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"
-    ] * any(name != _DRIVE for _, name, *_ in rows)
+        + (f"; {_DRIVE} is a margin already, with the factors of its standard")
+        * any(of == _DRIVE for _, of, *_ in rows)
+    ] * any(of != _DRIVE for _, of, *_ in rows)
     late = str(analysis.attrs.get(LATE, ""))
     notes += filter(None, [late.partition(";")[0]])  # the rest is a row
     head = ("limit", "of", "worst value", "margin", "in sample", "samples beyond")

@@ -208,7 +208,7 @@ class MotorWinding(FeedbackWinding):
     torque_limit: PositiveTorque | None = None
     """Largest torque that the motor's drive lets the shaft have."""
     current_limit: Ampere | None = None
-    """The same as a current; needs ``torque_constant``."""
+    """The same as a current, without that which flows without a load; needs ``torque_constant``."""
     torque_constant: TorqueConstant | None = None
     """Torque of the shaft over current above that without a load; with it a run tells the motor's
     current and electrical power."""

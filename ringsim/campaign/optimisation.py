@@ -42,7 +42,7 @@ from ringsim.campaign.run import Ended, Order, require_no_launcher, start
 from ringsim.campaign.specification import Budget, Campaign, Specification, Variable, campaign_of
 from ringsim.files import parse_toml, read_text, write_text, writing
 from ringsim.outputs.balance import instead_of
-from ringsim.outputs.family import VARIABLES, holds
+from ringsim.outputs.family import VARIABLES, holds, supply
 from ringsim.overrides import field_at, flat, with_number
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain, known_or_nearest, show
 from ringsim.sampling.table import first_inside, refuse_fixed
@@ -237,7 +237,7 @@ def _require_output(file: str, name: str, scene: Scene) -> None:
     if absent := sorted(set(VARIABLES[name].needs) - holds(scene) - {OF_CAMPAIGNS}):
         raise InputError(
             f"{file}: objectives.{name}: runs of this scene do not have this output, because the "
-            f"scene has no {absent[0]}: choose another, or add that to the scene"
+            f"scene has no {absent[0]}: choose another, or {supply(absent[0])}"
         )
 
 

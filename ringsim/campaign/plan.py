@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.analysis.design import placement_of
 from ringsim.analysis.influence import pairs
-from ringsim.analysis.intervals import quantities, samples_needed
-from ringsim.analysis.requirements import Requirement
+from ringsim.analysis.intervals import samples_needed
+from ringsim.analysis.requirements import Requirement, doubt_of
 from ringsim.campaign.folder import Folder, digests, opened_as, other_build
 from ringsim.campaign.run import Order, grown, growth_told
 from ringsim.campaign.stopping import End, decided, is_behind, looks_of
@@ -226,20 +226,12 @@ def _span(seconds: Array) -> str:
 
 def _required(requirements: Mapping[str, Requirement]) -> list[str]:
     """A line a requirement; a bound on the side on which nothing is wrong is pointed out."""
-    lines, known = list[str](), quantities()
-    for name, wanted in requirements.items():
-        worse = known[name].worse if name in known else "neither"
-        bounds = [key for key, _ in wanted.limits]
-        doubt = {("larger", "min"): "max", ("smaller", "max"): "min"}
-        meant = doubt.get((worse, bounds[0])) if len(bounds) == 1 else None
-        doubtful = (
-            f" (doubtful: {worse} values are the worse ones: is {meant} meant?)" if meant else ""
-        )
-        lines.append(
-            f"  requirement    {wanted.told(name)} with probability {wanted.probability:g}, "
-            f"confidence {wanted.confidence:g}{doubtful}"
-        )
-    return lines
+    return [
+        f"  requirement    {wanted.told(name)} with probability {wanted.probability:g}, confidence "
+        f"{wanted.confidence:g}" + f" ({doubt})" * bool(doubt)
+        for name, wanted in requirements.items()
+        for doubt in [doubt_of(name, [key for key, _ in wanted.limits])]
+    ]
 
 
 def _out_of_reach(requirements: Mapping[str, Requirement], samples: int) -> list[str]:

@@ -21,7 +21,7 @@ from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
 from ringsim.outputs.balance import instead_of
-from ringsim.outputs.family import VARIABLES, axes, holds
+from ringsim.outputs.family import VARIABLES, axes, holds, supply
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Correlation, Table
@@ -473,6 +473,6 @@ def campaign_of(
         if absent := sorted(set(VARIABLES[name].needs) - has - {OF_CAMPAIGNS}):
             raise InputError(
                 f"{path.name}: {where}: runs of this scene do not have this output, because the "
-                f"scene has no {absent[0]}: leave it out, or add that to the scene"
+                f"scene has no {absent[0]}: leave it out, or {supply(absent[0])}"
             )
     return Campaign(path, text, specification, varied)

@@ -151,6 +151,11 @@ _USUAL = {
         0.0, 1.0, "a pin of 10 mm with a dry friction of 0.3 has that under a load of 670 N"),
     "limits.rod_stress": (
         1e6, 1e10, "plastics bear more than 1 MPa, and no fibre 10 GPa; files give it in Pa"),
+    "limits.tension": (1.0, 1e6, "a thread of 0.1 mm bears some 10 N; files give it in N"),
+    "rods.density": (
+        100.0, 2.5e4, "foam has 100 kg/m3 and tungsten 19,300; files give it in kg/m3"),
+    "spacecraft.mass": (1.0, 1e6, "a cubesat has 1 kg; files give it in kg"),
+    "spacecraft.centre": (-50.0, 50.0, "no spacecraft is so large; files give it in m"),
 }  # fmt: skip
 """The least and the largest value, by path, that are not taken for a slip, and why."""
 _FASTEST = 2e3
@@ -180,6 +185,13 @@ def _doubtful(scene: Scene) -> Iterator[str]:
                 yield (
                     f"{path}.{name}.winding.no_load_speed = {speed:g} rad/s is above {_FASTEST:g} "
                     f"rad/s: {speed:g} rev/min are {speed * math.tau / 60.0:.4g} rad/s"
+                )
+            motor = winch.winding.motor
+            constant, limit = motor and motor.torque_constant, motor and motor.current_limit
+            if motor and constant and limit and (most := motor.stall_torque / constant) < limit:
+                yield (
+                    f"{path}.{name}.winding.current_limit = {limit:g} A is above {most:.3g} A, "
+                    "what the motor takes when it stalls: it never acts"
                 )
             radii |= {} if radius is None else {f"{path}.{name}.winding.drum_radius": radius}
             for key in ("start_time", "stop_time"):

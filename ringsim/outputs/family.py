@@ -383,6 +383,13 @@ def in_all_planes(values: Array, planes: Sequence[str]) -> Array:
     return found
 
 
+def supply(need: str) -> str:
+    """What gives a scene that which an output needs, as an order."""
+    if need in type(Scene.model_fields["record"].default).model_fields:
+        return f"set record.{need} = true"
+    return "add that to the scene"
+
+
 def holds(scene: Scene) -> set[str]:
     """Everything that a variable may need and the scene has."""
     winches = (winch for cable in _cables(scene) for winch in cable.winches)

@@ -23,6 +23,7 @@ from ringsim.outputs.family import (
     holds,
 )
 from ringsim.parts.faults import AT_ONCE
+from ringsim.variables import Fate
 
 # What the motors of the winches give.
 
@@ -255,6 +256,8 @@ class DriveMargins(Output):
         names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
         word = "enough" if margin >= 0.0 else "NOT enough"
+        if margin >= 0.0 and values.get("outcome") in (Fate.PARTLY_DEPLOYED, Fate.STALLED):
+            word = "enough for rigid rods, in which driven sections open those that are not"
         plane = float(values.get("least_plane_margin", math.nan))
         also = ", but one plane has" if margin >= 0.0 else ", and one plane even"
         own = f"{also} {plane:.3f}" if plane < min(margin, 0.0) - 5e-4 else ""

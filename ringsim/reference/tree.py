@@ -88,6 +88,8 @@ def find(path: str) -> list[Found]:
             own = tuple(filter(None, [kind_in(key.owner)]))
             both = tuple(dict.fromkeys(kinds + own))
             alike[facts] = Found(root, alike[facts].path if kinds else where, key, both)
+    if not alike and steps and steps[-1] == "kind":  # told with the table that is of a kind
+        return find(path.rpartition(".")[0])
     return list(alike.values())
 
 

@@ -336,8 +336,7 @@ def _strength(of: Of) -> Answer:
             found.result.append(f"{told}: margin {margin}, of {of_what} {worst}")
             found.lacks["factor of safety F"] = "the project's; then (1 + margin) / F - 1"
         stress = name == "peak_rod_stress" and name not in of.analysis
-        if stress:
-            found.lacks[name] = "record.stress = true"
+        found.lacks |= {name: "record.stress = true"} if stress else {}
         there = stress or name in of.analysis  # without cables nothing has a tension
         if there and not own and limit not in of.scene.keys() | by_path(of.campaign).keys():
             found.lacks[f"allowable of {name}"] = limit
@@ -368,9 +367,8 @@ def _drive(of: Of) -> Answer:
         for path, value in of.scene.items() if path.startswith("margin.")
     )  # fmt: skip
     found.evidence.append(f"static margin at all angles passed; {factors}")
-    if kind != wanted:
-        found.lacks["the factors of this clause"] = f'margin.kind = "{wanted}"'
-    return found + _verdicts(of, name)
+    lacks = {} if kind == wanted else {"the factors of this clause": f'margin.kind = "{wanted}"'}
+    return found + _verdicts(of, name) + Answer(lacks=lacks)
 
 
 @item(ECSS, "4.7.5.4.3 Latching or locking", "Latches catch at all temperatures and tolerances.")
@@ -396,9 +394,8 @@ def _cases(of: Of) -> Answer:
     ground = [f"{path} = {show(value)}" for path, value in of.scene.items()
               if path.startswith(("gravity.", "offload."))]  # fmt: skip
     found.result.append(", ".join(ground) or "in orbit: no gravity, no lines of a test rig")
-    if not ground:
-        found.lacks["the ground"] = "the same seed with gravity and offload, then ringsim compare"
-    return found
+    cure = "the same seed with gravity and offload, then ringsim compare"
+    return found if ground else found + Answer(lacks={"the ground": cure})
 
 
 @item(ECSS, "4.8.2.2 Worst-case identification", "Which cases size the mechanism.")
@@ -432,6 +429,7 @@ def _requirements(of: Of) -> Answer:
 @item(ECSS, "4.8.2.6.3 b Failure cases", "Failures of parts, and what to do then.")
 def _faults(of: Of) -> Answer:
     found = Answer(_drawn(of, lambda path, _: path.startswith("faults") or "stop_time" in path))
+    found.result += notes.reached_by_words(of.campaign, "faults")
     if "case" in of.analysis.dims:
         ends = Counter(of.analysis["case_outcome"].values.tolist())
         told = ", ".join(f"{count} {end}" for end, count in ends.items())
@@ -445,6 +443,8 @@ def _faults(of: Of) -> Answer:
 def _integrity(of: Of) -> Answer:
     rows = [row for each in of.errors for row in each.rows if "median" in each.head]
     found = Answer([f"{name}: median {median}, largest {most}" for name, median, most, _ in rows])
+    most = of.scene.get("solver.energy_tolerance")
+    found.evidence += [f"a run is refused whose imbalance exceeds {most:g}"] * bool(most)
     found.evidence += sorted({f"{row[-1]} samples" for row in rows})
     found.evidence += notes.remark_lines(of.campaign)
     return found if rows else Answer(lacks={"energy balance": "no sample has a valid result"})
@@ -469,9 +469,8 @@ def _sensitivity(of: Of) -> Answer:
     ])  # fmt: skip
     found.evidence += ["ringsim analyse --full lists all outputs and inputs"] * bool(rows)
     found.evidence += [note for note in table.notes if note.startswith("no significant")]
-    if not rows:
-        found.lacks["effects beyond chance"] = "more samples, or inputs that scatter"
-    return found
+    cure = "more samples, or inputs that scatter"
+    return found if rows else found + Answer(lacks={"effects beyond chance": cure})
 
 
 @item(ECSS, "4.8.2.6.3 e, f Test", "Differences of test and prediction are explained.")
@@ -498,7 +497,7 @@ def _validation(of: Of) -> Answer:
 
 @item(NASA, "factor 1, verification (second-hand)", "How large numerical errors are.")
 def _verification(of: Of) -> Answer:
-    found, own = _integrity(of), [name for name, each in quantities().items() if each.summary]
+    found, own = _integrity(of), [name for name in quantities() if not is_moment(name)]
     told = {name: _evidence(of, name).partition("; ")[2] for name in own if name in of.analysis}
     found.result += [f"{name}: {errors}" for name, errors in told.items() if errors]
     if not any("bar" in errors for errors in told.values()):
@@ -553,6 +552,7 @@ def _uncertainty(of: Of) -> Answer:
         if source and not is_moment(name):
             bare = cell["numerical (error bars)"] == "-"
             largest.setdefault(_UNMEASURED if bare else source, []).append(name)
+    found.lacks |= {} if largest else {"numerical errors": "error_bars_every"}
     for source, names in largest.items():
         many = source in (SOURCES[0], _UNMEASURED)
         told = counted(len(names), "output") if many else ", ".join(names)

@@ -110,7 +110,9 @@ def run_with_restarts(solve: Solve, solver: Solver, with_bars: WithBars) -> Outc
             how += f" and solver.tolerance = {used.tolerance:.2g}"
         # A start that only ran out of its smaller steps does not say what is wrong.
         cause = first.cause if outcome.cause is Cause.STEP_LIMIT else outcome.cause
-        reason = f"{outcome.reason} ({how}; start 1: {first.reason})"
+        # What else the first start says is of an antenna that its errors have moved.
+        why = first.reason.partition("; ")[0]
+        reason = f"{outcome.reason} ({how}; start 1: {why})"
         outcome = replace(outcome, reason=reason, cause=cause)
     if solver.error_bars and not outcome.status.failed:
         outcome = with_bars(outcome, used)

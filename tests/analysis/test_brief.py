@@ -117,7 +117,8 @@ def test_what_differs_by_less_than_its_numerical_error_is_one_value():
     least, most = made.peak_tension.values.min(), made.peak_tension.values.max()
     inside = f"{least:.4g} .. {most:.4g} N, mean {made.peak_tension.values.mean():.4g}"
     assert table.notes == [
-        f"differ by less than their numerical error: peak_tension {inside}, error bar 0.11"
+        f"no sample is farther from the mean than the numerical error: peak_tension {inside}, "
+        "median error bar 0.11"
     ]
     assert told_of.count("peak_tension") == 1
     # --full has its statistics, and a requirement brings it into the tables.
@@ -137,7 +138,8 @@ def test_what_differs_by_less_than_its_numerical_error_is_one_value():
     marks = {row[0]: row[-1] for row in budget.rows}
     assert marks == {"asynchrony_max": "engines *", "peak_tension": "numerical **"}
     assert budget.notes[-2:] == ["* numerical not measured", "** engines not measured"]
-    less = "not told, because samples differ by less than their numerical error: peak_tension"
+    why = "no sample is farther from the mean than the numerical error"
+    less = f"not told, because {why}: peak_tension"
     assert less in what_matters(required).notes
     assert "peak_tension" not in one.output.values
     assert "peak_tension_rank_correlation" not in one

@@ -11,7 +11,7 @@ import xarray as xr
 from made_campaign import made_campaign
 from matplotlib.text import Text
 
-from ringsim.analysis.campaign_notes import late_line, peak_lines, remark_lines
+from ringsim.analysis.campaign_notes import late_line, peak_lines, reached_by_words, remark_lines
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import not_met
 from ringsim.analysis.study_text import told as all_told
@@ -78,8 +78,8 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     again = "reached (start 2 with solver.step = 0.1 s; start 1: too much energy (10 %): reduce it)"
     once_more = made.assign(reason=("sample", np.array([again] + [reached] * 11, dtype=object)))
     assert remark_lines(once_more) == [
-        "in 1 of 11 samples, for example in sample 0: first attempt: too much energy (10 %): "
-        "reduce it"
+        "in 1 of 11 samples, for example in sample 0: first attempt, not used: too much energy "
+        "(10 %): reduce it"
     ]
     made["reason"] = "sample", np.array([f"{reached}; {latch}"] * 12, dtype=object)
     assert remark_lines(made) == [f"in all 11 samples, for example in sample 0: {latch}"]
@@ -171,6 +171,19 @@ def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> Non
     made["reason"] = "sample", np.array([REACHED] * 4, dtype=object)
     assert late_line(made) == ""
     assert words not in str(margin_table(analyse(made)).rows)
+
+
+def test_how_many_reach_their_goal_with_each_drawn_fault() -> None:
+    made = made_campaign(8)
+    words = ["jam", "none", "none", "jam", "none", "none", "none", "jam"]
+    law = {"role": "input", "path": "faults", "distribution": '{"kind": "discrete"}'}
+    made["faults"] = "sample", np.array(words, dtype=object), law
+    made["outcome"] = "sample", np.where(np.array(words) == "jam", 3, 1)
+    assert reached_by_words(made, "faults") == [
+        "deployed with jam: 0 of 3",
+        "deployed with none: 5 of 5",
+    ]
+    assert not reached_by_words(made, "boom")
 
 
 def test_figures_mark_the_panels_of_what_may_be_off() -> None:

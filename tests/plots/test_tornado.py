@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ringsim.analysis.design import placement
 from ringsim.analysis.sensitivity import sensitivity
-from ringsim.plots.campaign.frame import in_lines
+from ringsim.plots.campaign.frame import ALL_ALIKE, in_lines
 from ringsim.plots.campaign.numbers import distributions
 from ringsim.plots.campaign.tornado import bars_of, explained, tornado
 from ringsim.sampling.designs.blocks import Morris, Saltelli
@@ -166,16 +166,13 @@ def test_what_has_no_panel_for_want_of_differences_has_no_bars() -> None:
     campaign = made(RandomDesign(samples=200))
     said = {"long_name": "power of a motor", "units": "W"}
     campaign["peak_motor_power"] = 3.0 - 1e-3 * campaign["force"].assign_attrs(said)
-    told = "Not drawn, because samples differ by less than 0.1 %"
     for figure in (tornado(campaign), distributions(campaign)):
         titles = [axes.get_title(loc="left") + axes.get_xlabel() for axes in figure.axes]
         assert not any("Power of a motor" in title for title in titles)
         below = figure.get_supxlabel() + "".join(
             each.get_title().get_text() for each in figure.legends
         )
-        assert f"{told}, or than their numerical error: peak_motor_power." in " ".join(
-            below.split()
-        )
+        assert f"Not drawn, because {ALL_ALIKE}: peak_motor_power." in " ".join(below.split())
     assert "peak_motor_power" in dict(bars_of(campaign))
     limit = {"peak_motor_power": {"max": 4.0, "probability": 0.9, "confidence": 0.9}}
     campaign.attrs["requirements"] = json.dumps(limit)

@@ -101,6 +101,8 @@ def test_a_table_is_told_with_its_keys_and_kinds() -> None:
 
 def test_lists_say_what_they_have_a_value_for() -> None:
     assert "one for each section" in explain("rods.young_modulus")
+    assert explain("rods.kind") == explain("rods")
+    assert "table with a kind: ancf, geometrically-exact" in explain("rods.kind")
     assert "section (of an open ring corner)" in explain("net.stiffness")
     words = explain("cables.upper.friction.coefficient")
     assert "one for each pulley" in words

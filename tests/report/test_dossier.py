@@ -120,6 +120,10 @@ def short(file: File, said: re.Match[str]) -> None:
     assert bool(said["not"]) == bool((values < 0).any())
 
 
+def tolerance(file: File, said: re.Match[str]) -> None:
+    assert float(said["most"]) == file.scene["solver"]["energy_tolerance"]
+
+
 def balance(file: File, said: re.Match[str]) -> None:
     assert said["name"] == file.words["energy_error"]
     values = np.where(file.ok, file.values["energy_error"], np.nan)
@@ -197,6 +201,7 @@ KNOWN = {
     r"(?P<count>\d+) values: (?P<parts>.+)": summed,
     r"(peak_tension): largest of .*": anything,  # as in its row
     r"(?P<count>\d+) samples": held,
+    rf"a run is refused whose imbalance exceeds (?P<most>{N})": tolerance,
     r"(?P<count>\d+) of (?P<of>\d+) samples have run": complete,
     r"largest part of the error of the mean is sampling: (?P<count>\d+) outputs?": sampling,
     r"95 % intervals: .*|\d+ of \d+ runs failed, .*": anything,

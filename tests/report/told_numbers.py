@@ -7,6 +7,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import tomllib
 from pathlib import Path
 
 import netCDF4
@@ -122,6 +123,7 @@ class File:
                 name: np.ma.filled(v[:].astype(float), np.nan) for name, v in file.variables.items()
                 if v.dimensions == ("sample",) and v.dtype is not str and v.dtype.kind in "fi"
             }  # fmt: skip
+            self.scene = tomllib.loads(file.getncattr("scene"))
             told = {"degree": "deg"}  # as CF writes it, and as people do
             units = {name: getattr(v, "units", "") for name, v in file.variables.items()}
             self.units = {name: told.get(unit, unit) for name, unit in units.items()}

@@ -152,6 +152,15 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     assert "1 of the ok cells after a restart" in summary(whole)
     assert NEWTON in text
     assert "## Where ok ends" in text
+    wrong = cells(*ENDS, GOOD)
+    apart = np.full(wrong.sizes["cell"], np.nan)
+    apart[-1] = 0.055
+    wrong = wrong.assign(
+        tension_difference=("cell", apart), check=("cell", np.where(apart > 0, "differs", "")),
+        time_difference=("cell", 0.0 * apart), angle_difference=("cell", np.nan * apart),
+    )  # fmt: skip
+    text_of_wrong = to_markdown(joined([(WORDS, wrong)]))
+    assert "from a finer run: tension differs by 5.5 % (allowed 5 %)" in text_of_wrong
     assert "Where ok ends" not in to_markdown(joined([(WORDS, cells(GOOD))]))  # nothing ended
     figure = stability(whole)
     legend = [entry.get_text() for entry in figure.legends[0].get_texts()]

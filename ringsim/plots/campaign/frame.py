@@ -228,8 +228,13 @@ def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
     ]  # fmt: skip
     if not flat or len(flat) == len(names):
         return [], ""
-    within = f"by less than {100 * ALIKE:g} %, or than their numerical error"
-    return flat, f" Not drawn, because samples differ {within}: {', '.join(flat)}."
+    return flat, f" Not drawn, because {ALL_ALIKE}: {', '.join(flat)}."
+
+
+ALL_ALIKE = (
+    f"samples differ by less than {100 * ALIKE:g} %, or are no farther from the mean than the "
+    "numerical error"
+)
 
 
 def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:

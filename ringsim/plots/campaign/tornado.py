@@ -1,6 +1,7 @@
 """Which inputs matter for the main numbers: tornado, and single changes."""
 
 import itertools
+import re
 import textwrap
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -32,6 +33,7 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import one_at_a_time
 from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
+    ALL_ALIKE,
     drawable,
     head,
     in_lines,
@@ -266,6 +268,9 @@ def tornado(campaign: xr.Dataset) -> Figure:
         of += " An index that ends before the dashed line is drawn for the correlation below it."
     each = f"{shared[0].upper()}{shared[1:]} in each panel." if shared else ""
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", each, whiskers, of]))
+    stand = population_of(campaign)
+    if untold := [name for name in wanted if name in stand and not varies(stand, name)]:
+        caption += f" Not told, because {ALL_ALIKE}: {', '.join(untold)}."
     if quiet:
         caption += f" No significant input for {', '.join(quiet)}."
     if others := [name for name, _ in every[_MOST_PANELS:]]:
@@ -314,7 +319,10 @@ def _draw(axes: Axes, bars: Bars) -> None:
                          linewidth=1.2, label=_BY_CHANCE)  # fmt: skip
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
     axes.locator_params(axis="x", nbins=5)
-    axes.set_yticks(height, [in_lines(name) for name in bars.names], fontsize=8)
+    # What a fault breaks, and when, has no room here: "faults = jammed-pulley".
+    short = [re.sub(r"(?<= = )([\w-]+)\(.*\)$", r"\1", name) for name in bars.names]
+    names = short if len(set(short)) == len(short) else bars.names
+    axes.set_yticks(height, [in_lines(name) for name in names], fontsize=8)
     axes.grid(axis="y", visible=False)
 
 
