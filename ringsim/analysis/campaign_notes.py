@@ -1,14 +1,15 @@
 """What a merged campaign says about its runs and their numerics, in lines for people."""
 
+from __future__ import annotations
+
 import json
 import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.design import (
@@ -42,6 +43,9 @@ from ringsim.tables import (
     with_unit,
 )
 from ringsim.variables import Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _NAMED = 6
 """Samples that a line names at most."""

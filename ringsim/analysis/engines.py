@@ -1,12 +1,13 @@
 """How far the answers of the frame engine and of the full one are apart, output by output."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from ringsim.analysis.design import placement, population_of
 from ringsim.analysis.intervals import (
@@ -24,6 +25,9 @@ from ringsim.analysis.ladder import Rung, references
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.tables import counted, readable, text_table, unit_text, with_unit
 from ringsim.variables import GOALS, Fate, Outcome, Status
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _NOT_CHECKED = -1
 _NAMED = 6

@@ -1,12 +1,13 @@
 """How probable a rare event is, by a campaign of subset simulation."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-import xarray as xr
 
 from ringsim.analysis.intervals import (
     CHECKED,
@@ -21,6 +22,9 @@ from ringsim.sampling.designs.levels import Repetition, SubsetSimulation
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, bound_text, chance_text, with_unit
 from ringsim.variables import Status, about
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 DISAGREE = 0.01
 """Probability below which replicates scatter by more than their chains explain."""

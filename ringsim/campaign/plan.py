@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.analysis.design import placement_of
-from ringsim.analysis.influence import pairs
 from ringsim.analysis.intervals import samples_needed
 from ringsim.analysis.requirements import Requirement, doubt_of
 from ringsim.campaign.folder import Folder, digests, opened_as, other_build
@@ -263,6 +262,9 @@ def _confounded(table: Table, independent: bool) -> list[str]:
     names = [name for name, _ in found.values()]
     if len(names) < 2:
         return []
+    # Here: what analyses results takes half a second to load, and status needs none of it.
+    from ringsim.analysis.influence import pairs
+
     values = np.column_stack([each for _, each in found.values()])
     strong = [
         pair for pair in pairs(values, ~np.eye(len(names), dtype=bool))

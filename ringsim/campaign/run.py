@@ -27,7 +27,6 @@ from ringsim.campaign.folder import (
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
 from ringsim.campaign.stopping import Watch, as_decided, merge
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
-from ringsim.dataset import open_lazily
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.slot import Local, Serial
 from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost
@@ -232,6 +231,9 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
     if path is not None:
         _tell(f"{path}: {counted(campaign.table.samples, 'sample')}, {failed} failed")
         listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
+        # Here, as xarray takes half a second to load, which status need not wait for.
+        from ringsim.dataset import open_lazily
+
         with open_lazily(path) as dataset:
             lines = [] if choices.brief else notes(dataset)
             if not choices.brief and (listed or campaign.scene.solver.error_bars):

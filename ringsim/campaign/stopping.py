@@ -2,6 +2,8 @@
 all inputs beside all outputs in one file.
 """
 
+from __future__ import annotations
+
 import os
 import time
 from bisect import bisect_right
@@ -9,11 +11,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import netCDF4
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import derived
@@ -33,6 +34,9 @@ from ringsim.storage.journal import FOLDER, DamagedError, Survey
 from ringsim.storage.netcdf import GO_ON, PER_SAMPLE, OutputTable, locked, provenance
 from ringsim.storage.result import sample_of, stacked
 from ringsim.variables import Cause, Fidelity, Status, Variable
+
+if TYPE_CHECKING:
+    pass
 
 # Samples end in any order, and beyond the last look some have run already.  The rule asks only the
 # first samples of a look, all of them and no others, and only once they have all run: its answer is
@@ -85,6 +89,9 @@ class _Judge:
 
     def __init__(self, campaign: Folder, rule: Rule) -> None:
         self._campaign, self._rule = campaign, rule
+        # Here: it takes half a second, and status looks at no rule.
+        import xarray as xr
+
         self._empty = xr.Dataset(attrs=campaign.attributes)
         self._placed = placement(self._empty)
         self.numbers = rule.numbers(campaign.table.samples, self._placed.replicates)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -293,3 +294,12 @@ def test_an_unknown_pulley_under_set_is_refused_with_the_nearest(tmp_path):
         f'good.toml: set: {OF_CABLE}["section 6 W"]: there is no pulley or span of that name '
         '(did you mean "section 6 V"?)'
     )
+
+
+@pytest.mark.quick
+def test_status_loads_nothing_that_it_does_not_need():
+    """xarray alone takes half a second, and campaigns and status begin so."""
+    heavy = "{'xarray', 'pandas', 'matplotlib', 'exudyn', 'mpi4py'}"
+    code = f"import sys, ringsim.cli.campaign; print(*{heavy} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
