@@ -32,7 +32,7 @@ Places = NDArray[np.int64]
 # Reading the series of many samples block by block, so that memory does not grow with them.
 
 
-BLOCK_BYTES = 32 << 20
+BLOCK_BYTES = 8 << 20
 """Numbers of one variable that are read at once, about."""
 
 
