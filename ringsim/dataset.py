@@ -116,7 +116,9 @@ def require_declared(found: xr.Dataset, file: Path) -> None:
     """
     if "status" not in found or "scene" not in found.attrs:
         return
-    cure = "the file is damaged or changed: merge the campaign, or run the scene, again"
+    cure = (
+        "it is damaged, changed, or a part of a result: merge the campaign, or run the scene, again"
+    )
     for name, value in found.attrs.items():
         if name in (*_TEXTS, *_JSON) and not isinstance(value, str):
             raise InputError(f"{file}: its attribute {name} must be a text: {cure}")
@@ -135,13 +137,15 @@ def _undeclared(name: str, variable: xr.Variable, found: xr.Dataset) -> str:
     if (declared := COORDINATES.get(own) or VARIABLES.get(own)) is None:
         return ""
     samples = ("sample",) * ("sample" in found.dims and own not in COORDINATES)
-    if variable.dims != (dims := (*samples, *declared.dims)):
+    # A part of a result lacks dimensions, and people turn them round.
+    dims = tuple(dim for dim in (*samples, *declared.dims) if dim in found.dims)
+    if {*variable.dims} != {*dims}:
         return f"has the dimensions {_listed(variable.dims)}, must have {_listed(dims)}"
     text = declared.dtype == "str"
     if text is not (variable.dtype.kind in "OUS"):
         return f"must hold {'texts' if text else 'numbers'}"
     if own in COORDINATES:
-        values = variable.to_numpy()
+        values = np.atleast_1d(variable.to_numpy())
         again = len(set(values.tolist())) < len(values)
         again |= not text and not np.isfinite(values.astype(float)).all()
         return "holds a value twice, or none" if again else ""
@@ -149,7 +153,7 @@ def _undeclared(name: str, variable: xr.Variable, found: xr.Dataset) -> str:
     dim = own.rpartition("_")[2]
     if declared.dims or dim not in COORDINATES or dim == "time" or dim not in found.coords:
         return ""
-    known = {*found[dim].to_numpy().tolist(), -1, ""}
+    known = {*np.atleast_1d(found[dim].to_numpy()).tolist(), -1, ""}
     wrong = [each for each in variable.to_numpy().ravel().tolist() if each == each]
     wrong = [each for each in wrong if each not in known]
     return f"holds {wrong[0]}, which is not a {dim} of the file" if wrong else ""
@@ -239,21 +243,25 @@ def open_lazily(path: Path) -> xr.Dataset:
     equal ones once: as text of one width, one long log of a failed run would take as much memory
     in every sample.  InputError as of ``require_declared``.
     """
+    with netCDF4.Dataset(path) as file:
+        own = [
+            name for name in _SENTENCES if name in file.variables
+            and file[name].dimensions == ("sample",) and file[name].dtype is str
+        ]  # fmt: skip
     before = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(_KEPT_BYTES, *before[1:])
     try:
         with warnings.catch_warnings():
             # Of a file in which they stand twice, which is refused below.
             warnings.filterwarnings("ignore", "Duplicate dimension", UserWarning)
-            found = xr.open_dataset(path, engine="netcdf4", drop_variables=_SENTENCES)
+            found = xr.open_dataset(path, engine="netcdf4", drop_variables=own)
     finally:
         netCDF4.set_chunk_cache(*before)
     known: dict[str, str] = {}
     with netCDF4.Dataset(path) as file:
-        for name in _SENTENCES:
-            if name in file.variables and file[name].dimensions == ("sample",):
-                attributes = {key: file[name].getncattr(key) for key in file[name].ncattrs()}
-                found[name] = "sample", _shared(file[name], known), attributes
+        for name in own:
+            attributes = {key: file[name].getncattr(key) for key in file[name].ncattrs()}
+            found[name] = "sample", _shared(file[name], known), attributes
         ordered = {name: found[name] for name in file.variables if name in found.data_vars}
     result = xr.Dataset(ordered, found.coords, found.attrs)
     result.encoding = found.encoding

@@ -3,6 +3,7 @@
 Engines are imported by whoever runs them: each costs a second, and its own libraries.
 """
 
+import contextlib
 import threading
 import time
 import traceback
@@ -164,7 +165,9 @@ def _run(
         except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
             traceback.print_exc()  # a campaign keeps it in the sample's log
             cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
-            place = extensions.line_in(extensions.files_of(scene.imports), error)
+            place = ""
+            with contextlib.suppress(Exception):  # a module may be gone meanwhile
+                place = extensions.line_in(extensions.files_of(scene.imports), error)
             return Outcome(Status.ERROR, f"{type(error).__name__}: {error}{place}", cause=cause)
 
     def so_solved(solver: Solver) -> Scene:

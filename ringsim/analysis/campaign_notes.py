@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,7 @@ from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import DOUBT, may_be_off
 from ringsim.sampling.distributions import labels_of
+from ringsim.stepping.instant import Array
 from ringsim.tables import (
     Table,
     chance_text,
@@ -136,23 +138,32 @@ def reached_by_words(campaign: xr.Dataset, start: str) -> list[str]:
     so, as "deployed with none: 37 of 37".
     """
     held, words, lines = ran(campaign), endings(campaign), list[str]()
-    goal = next((word for word in REACHED if (words == word).any()), REACHED[0])
+    came = np.isin(words, REACHED)
     for name in inputs(campaign):
         values = campaign[name].to_numpy()
         if not called(campaign[name]).startswith(start) or values.dtype.kind not in "OU":
             continue
         told = labels_of(values) if values.ndim == 1 else values
-        for word in sorted(set(told[held].ravel().tolist())) if told.ndim == 1 else ():
+        drawn_words = Counter(told[held].tolist() if told.ndim == 1 else ())
+        for word, count in drawn_words.most_common(_MOST_WORDS):
             own = held & (told == word)
-            lines.append(f"{goal} with {word}: {int((own & (words == goal)).sum())} of {own.sum()}")
+            gone = int((own & ~good(campaign)).sum())
+            more = f", {counted(gone, 'failed run')}" * bool(gone)
+            lines.append(f"deployed with {word}: {int((own & came).sum())} of {count}{more}")
+        if (left := len(drawn_words) - _MOST_WORDS) > 0:
+            lines.append(f"and with {counted(left, 'other value')}: see campaign.nc")
     return lines
 
 
-def margins_once_on(campaign: xr.Dataset) -> NDArray[np.float64]:
-    """Least drive margins from the start of the last winch on, shape (samples,), where the least
-    of all is that of a time before; NaN elsewhere.
+_MOST_WORDS = 8
+"""Values of an input of words that are told one by one."""
+
+
+def margins_once_on(campaign: xr.Dataset, least: Array) -> Array:
+    """Least drive margins from the start of the last winch on, shape (samples,): other than the
+    ``least`` of all where that is of a time before, NaN where a run has ended before.
     """
-    found = np.full(campaign.sizes["sample"], np.nan)
+    found = least.copy()
     for sample, late in _late_starts(campaign):
         found[sample] = float(late[2] or "nan")
     return found
@@ -181,13 +192,15 @@ def late_line(campaign: xr.Dataset) -> str:
         return ""
     least, sample, late = min(found, key=lambda each: each[:2])
     names = re.findall(r"(\S+) starts at", late[1])
+    known = int(sum(np.isfinite(each) for each, *_ in found))
     line = (
         f"in {_of(len(found), int(held.sum()))} the least drive margin is that of a time before "
         f"{' and '.join(names)} start{'s' * (len(names) == 1)}"
     )
     if not np.isfinite(least):
         return line
-    return f"{line}; from then on all have at least {late[2]} (sample {sample}, {late[3]})"
+    which = "all have" if known == len(found) else f"the {known} that came so far have"
+    return f"{line}; from then on {which} at least {late[2]} (sample {sample}, {late[3]})"
 
 
 def _of(count: int, every: int) -> str:

@@ -1,6 +1,6 @@
 """A comparison of two campaigns or runs as tables: for terminals and pages alike."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
@@ -274,21 +274,25 @@ def _limits(found: xr.Dataset) -> Table:
     return Table(("limit", *heads), rows, left=1)
 
 
-def _numerical(found: xr.Dataset, names: Iterable[str]) -> list[str]:
+def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
     """Which differences numerical errors may have made, as far as error bars tell."""
-    within, known = list[str](), False
+    within = list[str]()
+    every = [found[str(name)] for name in found.data_vars if str(name).endswith("_numerical_error")]
+    known = any(bool(np.isfinite(each).any()) for each in every)
     for name in names:
         errors = found[f"{name}_numerical_error"].values
-        known |= bool(np.isfinite(errors).any())
         size, apart = float(np.sqrt(np.nansum(errors**2))), abs(found[f"{name}_difference"].item())
         if np.isfinite(errors).any() and apart <= size:
             factor, unit = readable(quantities()[name].units, size)
             within.append(f"{name} ({with_unit(number_text(factor * size, 2), unit)})")
+    if not names:
+        return []
     if not known:
         return ["numerical errors are not measured in either (error_bars_every), and not counted"]
-    told = "differences within the numerical errors of both (from error bars)"
+    told = "differences within the numerical errors (root sum of squares of the error bars of both)"
+    alone = "intervals are of sampling alone; " * (not found.attrs["runs"])
     return [f"{told}: {', '.join(within)}"] * bool(within) + [
-        "intervals are of sampling alone; numerical errors that both share cancel"
+        f"{alone}numerical errors that both share cancel"
     ]
 
 

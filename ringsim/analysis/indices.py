@@ -442,6 +442,8 @@ _SHUFFLES_OF_LOSSES = 999
 _MOST_SHUFFLES = 100_000
 """Shuffles of a column of few values, at most: they tell a probability of 0.05 over 170 tests to a
 fifth of itself."""
+_FEW_SHUFFLES = 5_000
+"""Shuffles up to which they may be drawn one by one, which takes 20 us each."""
 _DRAWN = 1_000_000
 """Numbers that all shuffles of a column of many values draw, about."""
 
@@ -499,7 +501,7 @@ def _as_far(ranks: Array, missing: Mask) -> float:
     random, far = np.random.default_rng(0), abs(float(ranks[missing].sum())) * (1.0 - 1e-9)
     shuffles = int(np.clip(_DRAWN // len(values), 999, _MOST_SHUFFLES))
     few = min(int(missing.sum()), len(missing) - int(missing.sum()))
-    if len(values) > few:
+    if len(values) > few and shuffles <= _FEW_SHUFFLES:
         # Centred ranks of all add up to 0: those that are left are as far, to the other side.
         drawn = (random.choice(len(ranks), few, replace=False, shuffle=False)
                  for _ in range(shuffles))  # fmt: skip

@@ -12,7 +12,7 @@ from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, unit_text
-from ringsim.variables import GOALS, Fate, Status
+from ringsim.variables import GOALS, OF_CAMPAIGNS, Fate, Status
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def check_sensors(measurement: Measurement, scene: Scene) -> None:
     """Refuse (InputError) sensors that no run of the scene has values for, and data without any."""
     known, has, file = axes(scene), holds(scene), measurement.file
     for sensor in file.sensors:
-        if absent := sorted(set(VARIABLES[sensor.variable].needs) - has):
+        if absent := sorted(set(VARIABLES[sensor.variable].needs) - has - {OF_CAMPAIGNS}):
             raise InputError(
                 f"sensor {sensor.name}: runs of this scene do not have {sensor.variable}, because "
                 f"the scene has no {absent[0]}: leave the sensor out, or {supply(absent[0])}"
@@ -279,7 +279,7 @@ def residual_table(found: list[Residuals]) -> Table:
               for n in ("mean_difference", "rms_difference", "largest_difference")),
             number_text(float(one["largest_difference_time"]), 4),
             number_text(factor * readings.deviation, 2),
-            *((number_text(float(one["within_band"]), 2), str(int(one["beyond_samples"]) or "-"))
+            *((_share(one), str(int(one["beyond_samples"]) or "-"))
               if sampled else (number_text(float(one["rms_in_deviations"]), 3),)),
         ))  # fmt: skip
     head = (
@@ -296,6 +296,12 @@ def residual_table(found: list[Residuals]) -> Table:
         f"{counted(told.attrs['compared'], 'reading')}",
     ]
     return Table(head, rows, notes)
+
+
+def _share(one: xr.Dataset) -> str:
+    """How many readings of a sensor lie in the band, and their share."""
+    share, count = float(one["within_band"]), int(one["compared"])
+    return f"{round(share * count)} ({number_text(share, 2)})" if np.isfinite(share) else "-"
 
 
 def _of_campaign(told: xr.Dataset) -> list[str]:

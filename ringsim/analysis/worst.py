@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import LATE, doubted, margins_once_on, marked
+from ringsim.analysis.campaign_notes import LATE, doubted, late_line, margins_once_on, marked
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -256,7 +256,8 @@ def worst(
         # A few stalled rings are told by what separates all that do not deploy, as if named there.
         if not side and not each.value:
             side = next((s for mask, s in wider if s and mask[own].all()), {})
-        wider.append((each.own, side))
+        if not each.value and not each.own.all():
+            wider.append((each.own, side))
         order = own[np.argsort(-each.badness[own], kind="stable")][:MOST]
         for place in order.tolist():
             told = _found(campaign, each.value, place)
@@ -441,12 +442,14 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         counts = int((least < 0.0).sum()), int(np.isfinite(least).sum())
         same = float(least[k])
         rows.append((f"{_DRIVE} >= 0", _DRIVE, _DRIVE, same, same, k, *counts))
-        started = np.where(np.isfinite(least), margins_once_on(campaign), np.nan)
-        if np.isfinite(started).any():
-            least = np.where(np.isfinite(started), started, least)
-            k, short = int(np.nanargmin(least)), int((least < 0.0).sum())
+        least = np.where(np.isfinite(least), margins_once_on(campaign, least), np.nan)
+        if str(late_line(campaign)) and np.isfinite(least).any():
+            k, counts = (
+                int(np.nanargmin(least)),
+                (int((least < 0.0).sum()), int(np.isfinite(least).sum())),
+            )
             same, words = float(least[k]), f"{_DRIVE} >= 0 with all winches on"
-            rows.append((words, _DRIVE, _DRIVE, same, same, k, short, counts[1]))
+            rows.append((words, _DRIVE, _DRIVE, same, same, k, *counts))
     if not rows:
         return xr.Dataset()
     texts, names, told_of, margin, value, places, beyond, of_all = zip(*rows, strict=True)

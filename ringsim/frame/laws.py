@@ -113,6 +113,14 @@ class _Notes:
         return len(self.rows) - 1
 
 
+def _files_of(record: object) -> list[str]:
+    """The file of a record's class; none of a class that was typed into a notebook."""
+    try:
+        return [inspect.getfile(type(record))]
+    except (OSError, TypeError):
+        return []
+
+
 def taped(laws: Sequence[tuple[Law, tuple[int, ...], object]], inputs: int, results: int) -> Tape:
     """A tape of laws, each with the shape of its coordinates and the record that it belongs to.
 
@@ -133,7 +141,7 @@ def taped(laws: Sequence[tuple[Law, tuple[int, ...], object]], inputs: int, resu
                 notes.end(each, place)
         except (TypeError, AttributeError, ValueError) as error:
             known = ", ".join(each.__name__ for each in _KNOWN)
-            where = line_in([inspect.getfile(type(record))], error)
+            where = line_in(_files_of(record), error)
             raise InputError(
                 f"{NOT_HERE} the law of {type(record).__name__}: {error}{where} (write it with "
                 f"arithmetic and numpy's {known} on each number, or {CURE})"

@@ -387,7 +387,15 @@ def supply(need: str) -> str:
     """What gives a scene that which an output needs, as an order."""
     if need in type(Scene.model_fields["record"].default).model_fields:
         return f"set record.{need} = true"
-    return "add that to the scene"
+    return _SUPPLIES.get(need, "add that to the scene")
+
+
+_SUPPLIES = {
+    "error bars": "set solver.error_bars = true",
+    "held base": 'set boom.base = "fixed"',
+    "prestress": "give rods.length_error or structure.hinge_error",
+}
+"""What gives other needs than those of ``record``."""
 
 
 def holds(scene: Scene) -> set[str]:

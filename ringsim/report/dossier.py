@@ -481,7 +481,7 @@ def _validation(of: Of) -> Answer:
         cell = dict(zip(of.test.head, row, strict=True))
         most, sigma = (with_unit(cell[n], cell["unit"]) for n in ("largest difference", "sigma"))
         found.result.append(
-            f"{cell['sensor']}: a share of {cell['within 90 %']} of {cell['readings']} readings in "
+            f"{cell['sensor']}: {cell['within 90 %'].split()[0]} of {cell['readings']} readings in "
             f"the band of 90 % of the samples; largest difference {most} at {cell['at (s)']} s, "
             f"scatter of a reading {sigma}"
         )

@@ -203,7 +203,7 @@ def _still_off(scene: Scene, drive: DriveMargin, time: float, way: "Passed") -> 
         told = f"; the least drive margin is that of {time:.4g} s, before {' and '.join(late)}"
         if (started := max(late.values())) < min(last, end):
             then = least_along(drive, way.between(started, math.inf))
-            told += f": from then on {then.margin:.3f} at {math.degrees(then.angle):.4g} deg"
+            told += f": from then on {then.margin:.4g} at {math.degrees(then.angle):.4g} deg"
     over = f"; the least drive margin ends at {end:.4g} s, when the last winch is switched off"
     return told + over * (last > end + AT_ONCE)
 

@@ -548,9 +548,7 @@ class Function(Distribution):
             ends = float(given.min()), float(given.max())
             cure = "add rows, or truncate that input"
             if low <= ends[0] + _ICE and ends[1] + _ICE <= high:
-                cure = (
-                    f"{ends[0]:g} to {ends[1]:g} C are {ends[0] + _ICE:g} to {ends[1] + _ICE:g} K"
-                )
+                cure += f"; if that is in C, it is {ends[0] + _ICE:g} to {ends[1] + _ICE:g} K"
             raise InputError(
                 f"inputs: {name}: {self.input} is drawn from {ends[0]:g} to {ends[1]:g}, and the "
                 f"table goes from {low:g} to {high:g}: {cure}"

@@ -289,7 +289,9 @@ def _from_table(table: Table, path: str, sample: int) -> str:
     """Where a value comes from that follows another input: from a table, and for which value."""
     for column in table.columns:
         if column.path == path and '"kind":"function"' in column.origin:
-            leaders = (c for c in table.columns if c is not column and not c.dim)
+            leaders = (
+                c for c in table.columns if not c.dim and '"kind":"function"' not in c.origin
+            )
             lead = next((c for c in leaders if (c.input or c.path) == column.input), None)
             at = "" if lead is None else f" = {show(plain(lead.values[sample]))} {lead.units}"
             return f" (by its table for {column.input}{at.removesuffix(' 1')})"

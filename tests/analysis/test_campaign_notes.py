@@ -18,6 +18,7 @@ from ringsim.analysis.study_text import told as all_told
 from ringsim.analysis.verdicts import verdict_table
 from ringsim.analysis.worst import margin_table
 from ringsim.plots.figures import figures_of
+from ringsim.variables import Status
 
 pytestmark = pytest.mark.quick
 
@@ -168,6 +169,12 @@ def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> Non
     )  # fmt: skip
     assert late_line(made).startswith(line)
     assert not remark_lines(made)
+    # A run that ends before that counts in neither.
+    reasons[2] = reasons[2].partition(": from then on")[0]
+    made["reason"] = "sample", np.array(reasons, dtype=object)
+    (row,) = (row for row in margin_table(analyse(made)).rows if row[0] == words)
+    assert row[2:] == ("0.1", "+0.1", "0", "0 of 3")
+    assert "from then on the 2 that came so far have at least 0.100" in late_line(made)
     made["reason"] = "sample", np.array([REACHED] * 4, dtype=object)
     assert late_line(made) == ""
     assert words not in str(margin_table(analyse(made)).rows)
@@ -179,10 +186,12 @@ def test_how_many_reach_their_goal_with_each_drawn_fault() -> None:
     law = {"role": "input", "path": "faults", "distribution": '{"kind": "discrete"}'}
     made["faults"] = "sample", np.array(words, dtype=object), law
     made["outcome"] = "sample", np.where(np.array(words) == "jam", 3, 1)
-    assert reached_by_words(made, "faults") == [
-        "deployed with jam: 0 of 3",
-        "deployed with none: 5 of 5",
-    ]
+    told = ["deployed with none: 5 of 5", "deployed with jam: 0 of 3"]
+    assert reached_by_words(made, "faults") == told
+    made["status"][0] = Status.DIVERGED
+    assert reached_by_words(made, "faults")[1] == "deployed with jam: 0 of 3, 1 failed run"
+    made["faults"] = "sample", np.array([*"abcdefgh"], dtype=object) + "xyz", law
+    assert len(reached_by_words(made, "faults")) == 8
     assert not reached_by_words(made, "boom")
 
 

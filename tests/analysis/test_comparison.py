@@ -76,8 +76,14 @@ def test_differences_within_the_numerical_errors_are_named():
     both = [each.assign(asynchrony_max_error=("sample", bars)) for each in (own, other)]
     assert compare(*both).asynchrony_max_numerical_error.values == pytest.approx([0.3, 0.3])
     told = [compared(compare(*pair)) for pair in (both, (both[0], other))]
-    said = "differences within the numerical errors of both (from error bars): asynchrony_max (0.42"
+    said = (
+        "differences within the numerical errors (root sum of squares of the error bars of both): "
+    )
+    said += "asynchrony_max (0.42"
     assert [any(x.startswith(said) for x in lines) for lines in told] == [True, False]
+    # Alike outputs have no row, and their bars are measured all the same.
+    same = compared(compare(both[0], both[0]))
+    assert not any("numerical errors are not measured" in line for line in same)
 
 
 def test_outputs_that_one_has_alone_are_named():

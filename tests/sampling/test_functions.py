@@ -108,7 +108,7 @@ def test_an_input_of_a_path_may_be_followed_place_by_place() -> None:
         ({"table": [[200.0, 1e5]]}, "must have 2 or more entries"),
         ({"table": [[200.0, -1e5], [320.0, 1e5]]}, "axial_stiffness"),
         ({"table": [[200.0, -1e5], [320.0, 1e5]]}, "(by its table for temperature = 2"),
-        ({"table": [[490.0, 1e5], [600.0, 1e5]]}, " C are 49"),
+        ({"table": [[490.0, 1e5], [600.0, 1e5]]}, "if that is in C, it is 49"),
         ({"shared": ["rods.density"]}, "give each path a function of its own"),
         ({"unit": "N"}, 'unit = "N": the scene says the unit of its paths (N): leave it out'),
     ],
