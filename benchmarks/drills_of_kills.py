@@ -6,6 +6,7 @@ import contextlib
 import functools
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -45,6 +46,18 @@ def optimum() -> tuple[Path, float]:
     return folder, time.monotonic() - begin
 
 
+@functools.cache
+def test_stand() -> Path:
+    """A folder with a short calibration, and the readings that it takes."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "measured"))
+    from test_calibrate import TRUTH, write_file, write_test
+
+    folder = Path(tempfile.mkdtemp(prefix="ringsim-drills-"))
+    write_test(folder, TRUTH)
+    write_file(folder, runs=32, stages=2)
+    return folder
+
+
 # Kills.
 
 
@@ -65,6 +78,8 @@ def killed_campaign(folder: Path, kind: str, ranks: int = 0, kills: int = 4) -> 
         solvers = [pid for pid in below if is_solver(pid)]
         targets = targets_of(process, kind, CHANCE)
         hit = strike(targets, below if kind == "tree" else [])
+        if records(folder / "out") >= SAMPLES:
+            hit = False  # what had finished all samples before may end as if nothing were
         hits += hit
         if hit and kind not in ("solver", "all solvers"):
             process.communicate(timeout=60)
@@ -77,6 +92,7 @@ def killed_campaign(folder: Path, kind: str, ranks: int = 0, kills: int = 4) -> 
     if process is not None:
         process.communicate(timeout=120)
         require(process.returncode == 0, f"exit code {process.returncode} though workers died only")
+    require(hits, "nothing was there to be killed")
     again = bench.start(*words, ranks=ranks, solver="")
     told, _ = again.communicate(timeout=120)
     require(again.returncode == 0, told)
@@ -97,16 +113,25 @@ for kind, ranks, what in (
     )(functools.partial(killed_campaign, kind=kind, ranks=ranks))  # fmt: skip
 
 
-def has_draft(folder: Path) -> bool:
-    return any(folder.rglob("*.draft"))
+def stopped_writing(process: subprocess.Popen[str], folder: Path, seconds: float) -> bool:
+    """Stop a process while a draft of its own stands in a folder; False if it ended before."""
+    old, end = {*folder.rglob("*.draft")}, time.monotonic() + seconds
+    while process.poll() is None and time.monotonic() < end:
+        if {*folder.rglob("*.draft")} - old:
+            process.send_signal(signal.SIGSTOP)
+            if {*folder.rglob("*.draft")} - old:
+                return True
+            process.send_signal(signal.SIGCONT)  # it was faster
+        time.sleep(0.001)
+    return False
 
 
 def killed_command(folder: Path, words: tuple[str, ...], product: str, kills: int = 5) -> str:
     """Kill a command while it writes and at random times, and run it once more."""
-    shutil.copytree(sound(), folder, dirs_exist_ok=True)
+    shutil.copytree(test_stand() if "cal.toml" in words else sound(), folder, dirs_exist_ok=True)
     bench, begin = Bench(folder), time.monotonic()
     done = bench.run(*words, solver="", fresh=True)
-    seconds, hits = time.monotonic() - begin, 0
+    seconds, hits, writing = time.monotonic() - begin, 0, 0
     shutil.copytree(folder, folder.with_name("before"), dirs_exist_ok=True)
     before = folder.with_name("before") / product
     for number in range(kills):
@@ -115,8 +140,7 @@ def killed_command(folder: Path, words: tuple[str, ...], product: str, kills: in
             shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
         process = bench.start(*words, solver="")
         if number < kills - 2:
-            until(lambda p=process: has_draft(folder) or p.poll() is not None, seconds + 60.0)
-            time.sleep(0.02 * CHANCE.random())
+            writing += stopped_writing(process, folder, seconds + 60.0)
         else:
             time.sleep(seconds * CHANCE.random())
         hits += process.poll() is None
@@ -125,6 +149,7 @@ def killed_command(folder: Path, words: tuple[str, ...], product: str, kills: in
         require_whole(folder)
         if product.endswith(".nc") and (folder / product).exists():
             require(same_values(folder / product, before), "other values at the place of the file")
+    require(writing, "never struck while it wrote")
     for draft in folder.rglob("*.draft"):  # whose writer might live, were it younger
         os.utime(draft, (time.time() - 7200.0,) * 2)
     done = bench.run(*words, solver="", fresh=True)
@@ -139,7 +164,7 @@ def killed_command(folder: Path, words: tuple[str, ...], product: str, kills: in
     require(
         not (left := drafts(folder)), f"{hits} kills; whole in the end, but {left} drafts are left"
     )
-    return f"{hits} kills; whole files only, the same command does it"
+    return f"{hits} kills, {writing} while it wrote; whole files only, the same command does it"
 
 
 COMMANDS = {
@@ -149,6 +174,10 @@ COMMANDS = {
     "replay": (("replay", "out", "3", "--save", "replay.nc"), "replay.nc"),
     "export": (("export", "out", "--format", "csv,mat", "--out", "tables"), "tables"),
     "run": (("run", "truss2", *SHORT, "--out", "new.nc"), "new.nc"),
+    "analyse": (("analyse", "out", "--out", "analysis.nc"), "analysis.nc"),
+    "dossier": (("dossier", "out", "--out", "dossier.html"), "dossier.html"),
+    "compare": (("compare", "out", "out", "--out", "both.nc", "--report", "both.html"), "both.nc"),
+    "calibrate": (("calibrate", "cal.toml", "--workers", "2", "--out", "cal"), "cal"),
 }
 for name, (words, product) in COMMANDS.items():
     drill(
@@ -172,6 +201,7 @@ def killed_optimisation(folder: Path) -> str:
         strike([process.pid], children_of(process.pid))
         process.communicate()
         require_whole(folder)
+    require(hits, "nothing was there to be killed")
     bench.run(*words, timeout=300)
     (front,) = (path.name for path in (before / "best").glob("*.nc"))
     require(same_values(folder / "best" / front, before / "best" / front), "another front")

@@ -1,6 +1,7 @@
 """What becomes of ringsim where processes are killed, disks fill up and files are hostile.
 
-python benchmarks/hardening.py [NAMES...] [--cases N] [--out docs/evidence/hardening.md]
+python benchmarks/hardening.py [NAMES...] [--cases N] [--jobs N]
+    [--out docs/evidence/hardening.md]
 
 To be run before each release, on a machine where nothing is lost: as root it mounts small file
 systems below its own folder.  NAMES are groups (kills, faults, files, fuzz) or parts of drills'
@@ -11,14 +12,16 @@ page.  What only root may do is skipped for others, and says so.
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import drills_of_faults  # noqa: F401
 import drills_of_files
 import drills_of_kills  # noqa: F401
-from drills import DRILLS, Drill, Skipped
+from drills import DRILLS, Skipped
 from stamp import stamp
 
 TITLE = """# Kills, full disks and hostile files
@@ -31,8 +34,9 @@ a small campaign of the frame engine, what must become of it, and what did.
 """
 
 
-def row(drill: Drill) -> tuple[list[str], bool]:
+def row(place_in_table: int) -> tuple[list[str], bool]:
     """The table's row of one drill, and whether it held."""
+    drill = DRILLS[place_in_table]
     with tempfile.TemporaryDirectory(prefix="ringsim-drill-") as place:
         folder = Path(place) / "own"
         folder.mkdir()
@@ -42,6 +46,8 @@ def row(drill: Drill) -> tuple[list[str], bool]:
             happened, held = str(why), "skipped"
         except AssertionError as fault:
             happened, held = " ".join(str(fault).split())[:1500], "no"
+        except subprocess.TimeoutExpired as late:
+            happened, held = f"no end within {late.timeout:g} s: {late.cmd}"[:1500], "no"
     cells = [drill.name, drill.did, drill.expected, happened.replace("|", "\\|"), held]
     return cells, held != "no"
 
@@ -51,23 +57,25 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", help="groups, or parts of names")
     parser.add_argument("--cases", type=int, help="cases of each kind of fuzzing")
+    parser.add_argument("--jobs", type=int, default=2, help="drills at once")
     parser.add_argument("--out", type=Path, help="page to write")
     given = parser.parse_args()
     groups = ("kills", "faults", "files", "fuzz")
     DRILLS.sort(key=lambda each: groups.index(each.group))
     if given.cases:
         drills_of_files.CASES = dict.fromkeys(drills_of_files.CASES, given.cases)
-    chosen = [each for each in DRILLS if not given.names
+    chosen = [place for place, each in enumerate(DRILLS) if not given.names
               or any(name == each.group or name in each.name for name in given.names)]  # fmt: skip
     lines, good = ["| drill | done | expected | happened | held |", "|---|---|---|---|---|"], True
     print(*lines, sep="\n", flush=True)
-    for each in chosen:
-        cells, held = row(each)
-        lines.append(f"| {' | '.join(cells)} |")
-        print(lines[-1], flush=True)
-        good &= held
+    with ProcessPoolExecutor(given.jobs) as drilling:  # forked, so that they know all drills
+        for cells, held in drilling.map(row, chosen):
+            lines.append(f"| {' | '.join(cells)} |")
+            print(lines[-1], flush=True)
+            good &= held
     if given.out is not None:
-        made = stamp("python benchmarks/hardening.py --out docs/evidence/hardening.md")
+        cases = f"--cases {given.cases} " * bool(given.cases)
+        made = stamp(f"python benchmarks/hardening.py {cases}--out docs/evidence/hardening.md")
         given.out.write_text(TITLE.format(stamp=made) + "\n".join(lines) + "\n", encoding="utf-8")
     return int(not good)
 

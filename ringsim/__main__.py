@@ -1,14 +1,22 @@
 """``python -m ringsim`` is the command ``ringsim``: one thread first, then all the rest."""
 
+import resource
 import sys
 
 from ringsim.threads import one_thread_from_here_on
+
+_LEAST = 450_000 * 1024
+"""Bytes of address space that numpy, scipy and netCDF4 take.  With a little less OpenBLAS fails to
+reserve its buffer and tries again for ever.
+"""
 
 
 def main() -> None:
     """Entry point of the command: numpy must not be loaded before its threads are counted."""
     try:
         one_thread_from_here_on()
+        if 0 <= resource.getrlimit(resource.RLIMIT_AS)[0] < _LEAST:
+            raise MemoryError
         from ringsim.cli import main as command
 
         command()

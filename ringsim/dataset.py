@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim import build
-from ringsim.files import require_file, whole, writing
+from ringsim.files import require_file, require_regular, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, axes, holds, span_names
 from ringsim.refusal import InputError
@@ -241,8 +241,9 @@ _READ_AT_ONCE = 1 << 14
 def open_lazily(path: Path) -> xr.Dataset:
     """A file of results as ``xarray.open_dataset`` gives it, but sentences of samples as objects,
     equal ones once: as text of one width, one long log of a failed run would take as much memory
-    in every sample.  InputError as of ``require_declared``.
+    in every sample.  InputError as of ``require_regular`` and ``require_declared``.
     """
+    require_regular(path)
     with netCDF4.Dataset(path) as file:
         own = [
             name for name in _SENTENCES if name in file.variables

@@ -260,7 +260,7 @@ def write_pvd(run: xr.Dataset, folder: Path, stem: str) -> list[Path]:
     values = _values(run, shape)
     for number, time in enumerate(shape.times.tolist()):
         name = f"{number:05d}.vtu"
-        with whole(inner / name, lasting=False) as draft:
+        with whole(inner / name, lasting=False, swept=False) as draft:
             draft.write_text(_grid(shape, values, time, words), encoding="utf-8")
         entries += f'<DataSet timestep="{time:.9g}" part="0" file="{inner.name}/{name}"/>\n'
     with whole(path, lasting=False) as draft:

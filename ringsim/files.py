@@ -139,6 +139,14 @@ def require_place(path: Path) -> None:
         raise InputError(f"{path}: cannot be written to this folder: choose another one")
 
 
+def require_regular(path: Path) -> None:
+    """Refuse (InputError) a pipe or a device in place of a file that is read here and there: to
+    open a pipe waits for a writer, and a device may have no end.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path}: is a pipe or a device, but must be a file: copy it into one")
+
+
 def require_file(path: Path) -> None:
     """Refuse (InputError) a name or a place at which no netCDF file can be written, and the files
     of a campaign, which nothing else may replace.
@@ -201,13 +209,13 @@ def _sweep(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def whole(path: Path, *, lasting: bool = True) -> Iterator[Path]:
+def whole(path: Path, *, lasting: bool = True, swept: bool = True) -> Iterator[Path]:
     """A draft to write to; it replaces ``path`` once it is complete.
 
-    A lasting file is on the disk by then, so that it survives a power cut as well; drafts that
-    others of its name have left are removed.
+    A lasting file is on the disk by then, so that it survives a power cut as well.  Drafts that
+    killed writers of its name have left are removed, unless thousands of files make that slow.
     """
-    if lasting:
+    if swept:
         _sweep(path)
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}{DRAFT}")
     try:

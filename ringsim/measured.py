@@ -28,7 +28,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from ringsim.files import parse_toml, read_text
+from ringsim.files import parse_toml, read_text, require_regular
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.units import ListIn, Model, Second, Unit
@@ -310,6 +310,7 @@ def _from_netcdf(path: Path, wanted: list[str]) -> dict[str, Array]:
     """
     import netCDF4
 
+    require_regular(path)
     found = dict[str, Array]()
     try:
         with netCDF4.Dataset(path) as data:

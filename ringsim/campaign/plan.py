@@ -345,6 +345,8 @@ def status_lines(campaign: Folder) -> list[str]:
     running, workers = dict[int, float](), 0
     spent, ended = np.zeros(2), np.zeros(2)
     for path in sorted(campaign.path.glob("progress-*.json")):
+        if not path.is_file():  # to open a pipe would wait for its writer
+            continue
         told = None
         with contextlib.suppress(OSError, ValueError):
             told = json.loads(path.read_text(encoding="utf-8"))

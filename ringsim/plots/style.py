@@ -273,7 +273,7 @@ def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: flo
     above, end = heading(dataset, subject, figure.get_size_inches()[0])
     title(figure, above)
     # The second of two lines reaches to what stands above the axes at their right end.
-    axes.set_title(end, pad=pad + _RAISED * end.count("\n"))
+    axes.set_title(plain(end), pad=pad + _RAISED * end.count("\n"))
     settle(figure)
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ringsim.choice import OneOf, kind_of
+from ringsim.files import require_regular
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.overrides import field_at, place_of, pulleys_at, section_of, with_number
 from ringsim.refusal import InputError, known_or_nearest, show
@@ -196,6 +197,7 @@ def learnt_from(
     """
     import netCDF4
 
+    require_regular(file)
     try:
         with netCDF4.Dataset(file) as data:
             words = {name: getattr(data, name, "") for name in ("inputs", "correlations")}

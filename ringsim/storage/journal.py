@@ -56,6 +56,8 @@ class Verified:
 
 def recall(folder: Path) -> dict[str, Verified]:
     """What was verified in a campaign's folder, by name of journal."""
+    if not (folder / NAME).is_file():  # to open a pipe would wait for its writer
+        return {}
     # Lost or damaged it costs the time to read the journals, so that no fault of it counts.
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):
         with (folder / NAME).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
@@ -270,6 +272,11 @@ def survey(folder: Path, run_with: Sequence[str], *, checks: bool = False) -> Su
     damaged.  What was verified once is remembered in the folder.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
+    if no_files := [path for path in journals if not path.is_file()]:
+        raise InputError(
+            f"{no_files[0]}: must be a journal of the campaign, and is no file: put the file back, "
+            "or remove this: the samples that it held run again"
+        )
     before = recall(folder)
     known = {path.name: _verified(path, before.get(path.name)) for path in journals}
     if any(known[name] is not before.get(name) for name in known):

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import netCDF4
@@ -66,6 +67,36 @@ def test_an_empty_note_of_what_was_verified_costs_nothing_but_time(copied):
     """As a full disk or a power cut leaves it."""
     empty(copied.folder / "out" / "journals-verified.npz")
     assert "20 of 20 samples done" in copied.run("status", "out")
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [("campaign.nc", "analyse"), ("design.nc", "status")],
+)
+def test_a_pipe_in_place_of_a_file_of_results_is_refused(copied, name, command):
+    """Nothing writes to it, so that who opens it waits for ever."""
+    path = copied.folder / "out" / name
+    path.unlink(missing_ok=True)
+    os.mkfifo(path)
+    told = copied.run(command, "out", code=2, timeout=60)
+    assert ("has no design.nc" if name == "design.nc" else "is a pipe or a device") in told
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir, lambda path: path.symlink_to(path)])
+@pytest.mark.parametrize("command", [["status", "out"], ["campaign", "small.toml", "--out", "out"]])
+def test_what_is_no_file_in_place_of_a_journal_is_refused(copied, make, command):
+    make(copied.folder / "out" / "journals" / "odd.journal")
+    told = copied.run(*command, code=2, timeout=60)
+    assert "odd.journal: must be a journal of the campaign" in told
+    assert "Traceback" not in told
+
+
+@pytest.mark.parametrize("name", ["journals-verified.npz", "progress-pipe.json"])
+def test_a_pipe_in_place_of_a_note_costs_nothing(copied, name):
+    path = copied.folder / "out" / name
+    path.unlink(missing_ok=True)
+    os.mkfifo(path)
+    assert "20 of 20 samples done" in copied.run("status", "out", timeout=60)
 
 
 def test_merge_of_an_unfinished_campaign_has_gaps(copied):

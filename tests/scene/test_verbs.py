@@ -218,6 +218,15 @@ def test_too_little_memory_is_told_in_one_line(error: str) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_a_limit_with_which_openblas_would_try_for_ever_is_refused() -> None:
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_AS, (400_000 * 1024,) * 2)"
+    code = f"{limit}; from ringsim.__main__ import main; main()"
+    words = [sys.executable, "-c", code, "check", "truss2"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.startswith("there is too little memory: raise the limit (ulimit -v)")
+
+
 @pytest.mark.quick
 def test_a_shell_completes_paths_after_set() -> None:
     def offered(begun: str) -> list[str]:
