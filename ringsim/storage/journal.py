@@ -272,9 +272,9 @@ def survey(folder: Path, run_with: Sequence[str], *, checks: bool = False) -> Su
     damaged.  What was verified once is remembered in the folder.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
-    if strange := [path for path in journals if not path.is_file()]:
+    if no_files := [path for path in journals if not path.is_file()]:
         raise InputError(
-            f"{strange[0]}: must be a journal of the campaign, and is no file: put the file back, "
+            f"{no_files[0]}: must be a journal of the campaign, and is no file: put the file back, "
             "or remove this: the samples that it held run again"
         )
     before = recall(folder)
