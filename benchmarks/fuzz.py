@@ -113,7 +113,7 @@ def fault_of(
         refusals = [
             line
             for line in lines
-            if not re.search(r"samples done|is damaged|samples, \d+ failed$", line)
+            if not re.search(r"samples done|journal is damaged: |samples, \d+ failed$", line)
         ]
         if len(refusals) != 1:
             return f"refused in {len(refusals)} lines: {' / '.join(refusals)[:200]}"
