@@ -244,6 +244,19 @@ def open_lazily(path: Path) -> xr.Dataset:
     in every sample.  InputError as of ``require_regular`` and ``require_declared``.
     """
     require_regular(path)
+    with warnings.catch_warnings():
+        # Of a file in which they stand twice, which is refused below.
+        warnings.filterwarnings("ignore", "Duplicate dimension", UserWarning)
+        result = _opened(path)
+        try:
+            require_declared(result, path)
+        except InputError:
+            result.close()
+            raise
+    return result
+
+
+def _opened(path: Path) -> xr.Dataset:
     with netCDF4.Dataset(path) as file:
         own = [
             name for name in _SENTENCES if name in file.variables
@@ -252,10 +265,7 @@ def open_lazily(path: Path) -> xr.Dataset:
     before = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(_KEPT_BYTES, *before[1:])
     try:
-        with warnings.catch_warnings():
-            # Of a file in which they stand twice, which is refused below.
-            warnings.filterwarnings("ignore", "Duplicate dimension", UserWarning)
-            found = xr.open_dataset(path, engine="netcdf4", drop_variables=own)
+        found = xr.open_dataset(path, engine="netcdf4", drop_variables=own)
     finally:
         netCDF4.set_chunk_cache(*before)
     known: dict[str, str] = {}
@@ -267,11 +277,6 @@ def open_lazily(path: Path) -> xr.Dataset:
     result = xr.Dataset(ordered, found.coords, found.attrs)
     result.encoding = found.encoding
     result.set_close(found.close)
-    try:
-        require_declared(result, path)
-    except InputError:
-        result.close()
-        raise
     return result
 
 
