@@ -257,23 +257,24 @@ def open_lazily(path: Path) -> xr.Dataset:
 
 
 def _opened(path: Path) -> xr.Dataset:
-    with netCDF4.Dataset(path) as file:
-        own = [
-            name for name in _SENTENCES if name in file.variables
-            and file[name].dimensions == ("sample",) and file[name].dtype is str
-        ]  # fmt: skip
     before = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(_KEPT_BYTES, *before[1:])
     try:
-        found = xr.open_dataset(path, engine="netcdf4", drop_variables=own)
+        # One handle for both: a file that is opened twice in turns crashes netCDF's library.
+        opening: Any = xr.backends.NetCDF4DataStore.open
+        store = opening(str(path))
     finally:
         netCDF4.set_chunk_cache(*before)
-    known: dict[str, str] = {}
-    with netCDF4.Dataset(path) as file:
-        for name in own:
-            attributes = {key: file[name].getncattr(key) for key in file[name].ncattrs()}
-            found[name] = "sample", _shared(file[name], known), attributes
-        ordered = {name: found[name] for name in file.variables if name in found.data_vars}
+    file, known = store.ds, dict[str, str]()
+    own = [
+        name for name in _SENTENCES if name in file.variables
+        and file[name].dimensions == ("sample",) and file[name].dtype is str
+    ]  # fmt: skip
+    found = xr.open_dataset(store, drop_variables=own)
+    for name in own:
+        attributes = {key: file[name].getncattr(key) for key in file[name].ncattrs()}
+        found[name] = "sample", _shared(file[name], known), attributes
+    ordered = {name: found[name] for name in file.variables if name in found.data_vars}
     result = xr.Dataset(ordered, found.coords, found.attrs)
     result.encoding = found.encoding
     result.set_close(found.close)

@@ -205,5 +205,9 @@ def test_figures_mark_the_panels_of_what_may_be_off() -> None:
         assert [each for each in labels if each.endswith(" ?")] == [
             each for each in labels if names and "tension" in each
         ]
+        titles = [axes.get_title(loc="left") for axes in drawn["tornado"].axes]
+        assert [each for each in titles if each.endswith(" ?")] == [
+            each for each in titles if names and "tension" in each
+        ]
         texts = " ".join(" ".join(each.get_text().split()) for each in figure.findobj(Text))
         assert ("peak_tension in 3 of 8 samples" in texts) == bool(names)

@@ -270,7 +270,7 @@ def test_places_and_names_survive_a_campaign(tmp_path, monkeypatch) -> None:
     worst = int(np.argmax(found.peak_tension.values))
     span, plane = int(found.peak_tension_span[worst]), found.peak_tension_plane[worst].item()
     line = (
-        f"  largest tension in sample {worst}: {found.peak_tension[worst]:.3f} N at "
+        f"  largest tension in sample {worst}: {found.peak_tension[worst]:.4g} N at "
         f"{found.peak_tension_time[worst]:.4g} s: {plane}, span {span} "
         f"({TRUSS.span_names[plane][span - 1]})"
     )

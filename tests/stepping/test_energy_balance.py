@@ -70,7 +70,5 @@ def test_a_run_tells_that_its_patience_ended(monkeypatch: pytest.MonkeyPatch) ->
     )  # fmt: skip
     assert "accepted as they were" not in run_frame(scene).reason
     monkeypatch.setattr(repeats, "PATIENCE", 1)
-    assert (
-        "steps repeated to keep the energy balance: 1, further ones were accepted"
-        in run_frame(scene).reason
-    )
+    once = run_frame(scene.with_values({"solver.restarts": 0}))
+    assert "steps repeated to keep the energy balance: 1, further ones were accepted" in once.reason

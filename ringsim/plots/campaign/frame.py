@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_notes import (
@@ -112,7 +113,10 @@ def mark_panels(figure: Figure, names: Collection[str]) -> bool:
     both = [(VARIABLES[n], VARIABLES.get(VARIABLES[n].largest_of or VARIABLES[n].least_of))
             for n in names]  # fmt: skip
     words = [each.long_name.lower() for pair in both for each in pair if each is not None]
-    texts = [t for a in figure.axes for t in (a.title, a.xaxis.label, a.yaxis.label)]
+    texts = [
+        text for axes in figure.axes
+        for text in (*_titles(axes), axes.xaxis.label, axes.yaxis.label)
+    ]  # fmt: skip
     texts += [figure._supylabel] if figure._supylabel else []  # type: ignore[attr-defined]
     found = []
     for text in texts:
@@ -124,6 +128,12 @@ def mark_panels(figure: Figure, names: Collection[str]) -> bool:
     for text in found:
         text.set_text(f"{text.get_text()}{DOUBT}")
     return bool(found)
+
+
+def _titles(axes: Axes) -> list[Text]:
+    """The titles of a panel on the left and in the middle."""
+    own = [axes.get_title(loc=side) for side in ("left", "center")]
+    return [text for text in axes.findobj(Text) if text.get_text() and text.get_text() in own]
 
 
 def standing(campaign: xr.Dataset) -> tuple[xr.Dataset, str]:
