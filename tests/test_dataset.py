@@ -293,3 +293,15 @@ def test_long_sentences_of_samples_take_no_room_in_the_others(tmp_path: Path) ->
         assert len({id(text) for text in found["reason"].values}) == 1
         for name in columns:
             assert found[name].values.tolist() == plain[name].values.tolist()
+
+
+def test_a_sentence_of_a_part_of_a_campaign_is_kept(tmp_path):
+    """Of one sample of a campaign it is no sentence over samples, and stays as xarray reads it."""
+    run = to_dataset(failed_outcome(), scene_of())
+    part = run.assign(reason=((), "it ended so"))
+    part.to_netcdf(tmp_path / "part.nc")
+    with open_lazily(tmp_path / "part.nc") as found:
+        assert found["reason"].item() == "it ended so"
+        # And once more while it is open, as a comparison with itself does.
+        with open_lazily(tmp_path / "part.nc") as again:
+            assert again["reason"].item() == "it ended so"

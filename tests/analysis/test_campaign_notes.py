@@ -162,6 +162,7 @@ def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> Non
     )
     table = margin_table(analyse(made))
     assert table.notes[-1] == line.partition(";")[0]
+    assert not any("limit / worst value" in note for note in table.notes)  # it is a margin already
     # The sample without a word on it counts with its own margin, of 0.1.
     words = "least_drive_margin >= 0 with all winches on"
     assert table.rows[-1] == (

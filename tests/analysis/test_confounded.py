@@ -106,3 +106,12 @@ def test_the_cure_is_of_the_design_and_none_parts_what_is_drawn_so():
     assert cure(RandomDesign(samples=64)) == "draw more samples"
     text = '[[correlations]]\nbetween = ["x1", "x2"]\ncoefficient = 0.99\n'
     assert cure(RandomDesign(samples=64), text).startswith("they are drawn so")
+
+
+def test_a_pair_of_few_samples_has_no_share_to_tell():
+    """Below the samples that an index takes there is the rank correlation alone."""
+    made = drawn_campaign(RandomDesign(kind="random", samples=12), lambda x: x[:, 0], 2, 3)
+    made["x2"] = made["x1"].variable ** 2 + 0.1 * made["x2"].variable
+    words = " ".join(told(analyse(made)))
+    assert "(r = +" in words
+    assert "nan" not in words
