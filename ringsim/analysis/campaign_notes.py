@@ -6,7 +6,7 @@ import json
 import re
 import textwrap
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -28,13 +28,21 @@ from ringsim.analysis.design import (
     learnt_lines,
 )
 from ringsim.analysis.indices import UNLIKELY, dependence
-from ringsim.analysis.intervals import CHECKED, Mask, good, lost, ran, used, worst_sample
+from ringsim.analysis.intervals import (
+    CHECKED,
+    Mask,
+    good,
+    lost,
+    numbers,
+    ran,
+    used,
+    worst_sample,
+)
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import DOUBT, may_be_off
 from ringsim.sampling.distributions import labels_of
-from ringsim.stepping.instant import Array
 from ringsim.tables import (
     Table,
     chance_text,
@@ -113,7 +121,7 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
     held, reasons = good(campaign), campaign["reason"].to_numpy()
     for sample in np.flatnonzero(held).tolist():
         for remark in str(reasons[sample]).split("; ")[1:]:
-            if may_be_off(f"; {remark}")[0] or _LATE.match(remark):
+            if may_be_off(f"; {remark}")[0] or remark.startswith(_LATE):
                 continue
             remark = remark.replace("start 1: ", "first attempt, not used: ", 1)
             if remark.count(")") > remark.count("("):  # which the words before it have opened
@@ -127,10 +135,7 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
     ]
 
 
-_LATE = re.compile(
-    r"the least drive margin is that of .* before (\S+ starts at .*?)"
-    r"(?:: from then on (\S+) (at .*))?$"
-)
+_LATE = "the least drive margin is that of "
 
 
 def reached_by_words(campaign: xr.Dataset, start: str) -> list[str]:
@@ -159,48 +164,25 @@ _MOST_WORDS = 8
 """Values of an input of words that are told one by one."""
 
 
-def margins_once_on(campaign: xr.Dataset, least: Array) -> Array:
-    """Least drive margins from the start of the last winch on, shape (samples,): other than the
-    ``least`` of all where that is of a time before, NaN where a run has ended before.
-    """
-    found = least.copy()
-    for sample, late in _late_starts(campaign):
-        found[sample] = float(late[2] or "nan")
-    return found
-
-
-def _late_starts(campaign: xr.Dataset) -> Iterator[tuple[int, re.Match[str]]]:
-    """The places of the samples whose least margin is that of a time before a winch starts, with
-    what their runs say of it.
-    """
-    if "reason" not in campaign:
-        return
-    reasons = campaign["reason"].to_numpy()
-    for sample in np.flatnonzero(good(campaign)).tolist():
-        for remark in str(reasons[sample]).split("; ")[1:]:
-            if late := _LATE.match(remark):
-                yield sample, late
-
-
 def late_line(campaign: xr.Dataset) -> str:
-    """In how many samples the least drive margin is that of a time before a winch starts, and the
-    least of all samples from that start on; empty if in none.
+    """In how many samples the least drive margin is that of a time before the last winch starts,
+    and the least of all samples from that start on; empty if in none.
     """
-    held = good(campaign)
-    found = [(float(late[2] or "inf"), sample, late) for sample, late in _late_starts(campaign)]
-    if not found:
+    least, later = (numbers(campaign, f"least_drive_margin{end}") for end in ("", "_started"))
+    held = good(campaign) & np.isfinite(least)
+    late = held & ~(later <= least)  # NaN of runs that ended before that start
+    if "least_drive_margin_started" not in campaign or not late.any():
         return ""
-    least, sample, late = min(found, key=lambda each: each[:2])
-    names = re.findall(r"(\S+) starts at", late[1])
-    known = int(sum(np.isfinite(each) for each, *_ in found))
-    line = (
-        f"in {_of(len(found), int(held.sum()))} the least drive margin is that of a time before "
-        f"{' and '.join(names)} start{'s' * (len(names) == 1)}"
-    )
-    if not np.isfinite(least):
-        return line
-    which = "all have" if known == len(found) else f"the {known} that came so far have"
-    return f"{line}; from then on {which} at least {late[2]} (sample {sample}, {late[3]})"
+    which = _of(int(late.sum()), int(held.sum()))
+    line = f"in {which} the least drive margin is that of a time before the last winch starts"
+    known = held & np.isfinite(later)
+    if not known.any():
+        return f"{line}, to which no run came"
+    k = int(np.argmin(np.where(known, later, np.inf)))
+    came = "all have" if known.sum() == held.sum() else f"the {known.sum()} that came so far have"
+    angle = numbers(campaign, "least_drive_margin_started_angle")[k]
+    where = f"sample {int(campaign['sample'][k])}, at {angle:.4g} deg"
+    return f"{line}; from then on {came} at least {later[k]:.4g} ({where})"
 
 
 def _of(count: int, every: int) -> str:

@@ -58,6 +58,7 @@ from ringsim.analysis.verdicts import (
     verdict_text,
 )
 from ringsim.analysis.worst import margin_table, margins, worst_lines, worst_tables
+from ringsim.outputs.family import Array
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import law_text
 from ringsim.tables import (
@@ -149,13 +150,12 @@ def _verdicts(analysis: xr.Dataset) -> Table:
     for name in analysis["requirement"].values:
         one = analysis.sel(requirement=name)
         rows.append((
-            one["requirement_text"].item(), f"{one['probability_required'].item():g}",
-            f"{one['confidence_required'].item():g}",
-            Verdict(one["reweighted_verdict"].item()).words,
+            one["requirement_text"].item(), Verdict(one["reweighted_verdict"].item()).words,
+            f"{one['probability_required'].item():g}", f"{one['confidence_required'].item():g}",
             number_text(one["reweighted_probability"].item()),
             decisive(Verdict(one["reweighted_verdict"].item()), *one["reweighted_bounds"].values),
         ))  # fmt: skip
-    head = ("requirement, reweighted", "probability", "confidence", "verdict", SHARE_MET,
+    head = ("requirement, reweighted", "verdict", "probability", "confidence", SHARE_MET,
             BOUND)  # fmt: skip
     return marked(Table(head, rows), analysis, head.index(SHARE_MET))
 
@@ -349,6 +349,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     only if ``every`` one is told.
     """
     rows, few, alike, within = [], False, list[str](), list[str]()
+    known, again = dict[str, Array](), list[str]()
     wanted = analysis["requirement"].values if "requirement" in analysis.dims else ()
     for name in outputs_in(analysis):
         if is_moment(name) and not every:
@@ -363,6 +364,11 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
             value = "0" if abs(least) < NOTHING else f"{number_text(least)} {units}".rstrip()
             alike.append(f"{name} {value}" + f" (in {count})" * int(used < run))
             continue
+        twin = next((one for one, own in known.items() if _equal(own, values)), None)
+        if twin is not None and not every and name not in wanted:
+            again.append(f"{name} is {twin}")
+            continue
+        known[name] = values
         if np.isfinite(bar):
             inside = f", mean {fine_text(mean, fine)}" * bool(np.isfinite(mean))
             told = f"{fine_text(least, fine)} .. {fine_text(most, fine)} {units}".rstrip()
@@ -382,11 +388,17 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         "least", "most", "worst sample", "samples used",
     )  # fmt: skip
     notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
+    notes += [f"in all samples {', '.join(again)}"] * bool(again)
     if any(row[-2] == "-" for row in rows):
         notes.append("no worst sample of outputs of which nothing says which end is worse")
     if within:
         notes.append(f"{_WITHIN}: {'; '.join(within)}")
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
+
+
+def _equal(first: Array, second: Array) -> bool:
+    """Whether all statistics of two outputs are the same but for round-off."""
+    return np.allclose(first, second, rtol=1e-9, atol=0.0, equal_nan=True)
 
 
 _WITHIN = "no sample is farther from the mean than the numerical error"

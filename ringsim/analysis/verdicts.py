@@ -388,8 +388,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             one["probability"], chosen = np.nan, True
             notes.append(f"{name}: {bad} of {used} samples violate it")
         rows.append((
-            one["requirement_text"], f"{one['probability_required']:g}",
-            f"{one['confidence_required']:g}", verdict_text(one), number_text(one["probability"]),
+            one["requirement_text"], verdict_text(one), f"{one['probability_required']:g}",
+            f"{one['confidence_required']:g}", number_text(one["probability"]),
             decisive(verdict, one["probability_lower"], one["probability_upper"]),
             str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
             alone.words if one["samples_lost"] else "-", str(further) if further > 0 else "-",
@@ -441,8 +441,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
     if rows:
         notes.insert(0, _CHOSEN if chosen else _DECIDES)
     head = (
-        f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
-        "verdict", SHARE_MET, BOUND, "samples used", "violating", "failed runs",
+        f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "verdict", "probability",
+        "confidence", SHARE_MET, BOUND, "samples used", "violating", "failed runs",
         "verdict without failed runs", "samples to go",
     )  # fmt: skip
     return marked(Table(head, rows, notes), analysis, head.index(SHARE_MET))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import LATE, doubted, late_line, margins_once_on, marked
+from ringsim.analysis.campaign_notes import LATE, doubted, late_line, marked
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -436,20 +436,13 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         known = good(campaign) & np.isfinite(values)  # ropes that never were slack have 0 s of it
         counts = int((known & (values > allowed)).sum()), int(known.sum())
         rows.append((told, peak, of, float(ratio[k]), float(values[k]), k, *counts))
-    least = np.where(good(campaign), numbers(campaign, _DRIVE), np.nan)
-    if np.isfinite(least).any():
-        k = int(np.nanargmin(least))
-        counts = int((least < 0.0).sum()), int(np.isfinite(least).sum())
-        same = float(least[k])
-        rows.append((f"{_DRIVE} >= 0", _DRIVE, _DRIVE, same, same, k, *counts))
-        least = np.where(np.isfinite(least), margins_once_on(campaign, least), np.nan)
-        if str(late_line(campaign)) and np.isfinite(least).any():
-            k, counts = (
-                int(np.nanargmin(least)),
-                (int((least < 0.0).sum()), int(np.isfinite(least).sum())),
-            )
-            same, words = float(least[k]), f"{_DRIVE} >= 0 with all winches on"
-            rows.append((words, _DRIVE, _DRIVE, same, same, k, *counts))
+    for name in (_DRIVE, *[f"{_DRIVE}_started"] * bool(late_line(campaign))):
+        least = np.where(good(campaign), numbers(campaign, name), np.nan)
+        if np.isfinite(least).any():
+            k = int(np.nanargmin(least))
+            counts = int((least < 0.0).sum()), int(np.isfinite(least).sum())
+            same = float(least[k])
+            rows.append((f"{name} >= 0", name, name, same, same, k, *counts))
     if not rows:
         return xr.Dataset()
     texts, names, told_of, margin, value, places, beyond, of_all = zip(*rows, strict=True)
@@ -524,8 +517,8 @@ def margin_table(analysis: xr.Dataset) -> Table:
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"
         + (f"; {_DRIVE} is a margin already, with the factors of its standard")
-        * any(of == _DRIVE for _, of, *_ in rows)
-    ] * any(of != _DRIVE for _, of, *_ in rows)
+        * any(of.startswith(_DRIVE) for _, of, *_ in rows)
+    ] * any(not of.startswith(_DRIVE) for _, of, *_ in rows)
     late = str(analysis.attrs.get(LATE, ""))
     notes += filter(None, [late.partition(";")[0]])  # the rest is a row
     head = ("limit", "of", "worst value", "margin", "in sample", "samples beyond")

@@ -393,6 +393,7 @@ def supply(need: str) -> str:
 _SUPPLIES = {
     "error bars": "set solver.error_bars = true",
     "held base": 'set boom.base = "fixed"',
+    "second winch": "give its cables two, as [cables.lower.winch] or a far_winch",
     "prestress": "give rods.length_error or structure.hinge_error",
 }
 """What gives other needs than those of ``record``."""
@@ -400,7 +401,7 @@ _SUPPLIES = {
 
 def holds(scene: Scene) -> set[str]:
     """Everything that a variable may need and the scene has."""
-    winches = (winch for cable in _cables(scene) for winch in cable.winches)
+    winches = [winch for cable in _cables(scene) for winch in cable.winches]
     motors = [motor for winch in winches if (motor := winch.winding.motor) is not None]
     held = {name: getattr(scene, name) is not None for name in type(scene).parts()}
     held |= {
@@ -411,6 +412,7 @@ def holds(scene: Scene) -> set[str]:
         "error bars": scene.solver.error_bars,
         "gauge": bool(scene.structure.gauge),
         "motors": bool(motors),
+        "second winch": len(winches) > 1,
         "torque_constant": any(motor.torque_constant is not None for motor in motors),
         "reactions": scene.record.reactions,
         "shape": scene.record.shape,

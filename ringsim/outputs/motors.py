@@ -29,6 +29,10 @@ from ringsim.variables import Fate
 
 
 _CONSTANTS = ("torque_constant",)
+SEVERAL = ("second winch",)
+_LAGS = 0.01
+"""Share of its command by which a motor is slower before it counts: the passage to a limit of
+torque begins with parts in a thousand, which nobody commands."""
 
 
 class Motors(Output):
@@ -73,6 +77,17 @@ class Motors(Output):
             summary=("largest motor power", "10.3g"), worse="larger", largest_of="motor_power",
         ),
         Variable(
+            "motor_lag_duration", ("plane", "winch"), "s",
+            "time that a motor was slower than commanded by more than 1 %, for want of torque; NaN "
+            "of motors without a command",
+        ),
+        Variable(
+            "longest_motor_lag", (), "s",
+            "longest such time of any motor",
+            summary=("a motor was slower than commanded", "10.3g"), worse="larger",
+            largest_of="motor_lag_duration",
+        ),
+        Variable(
             "total_motor_energy", (), "J", "energy that the shafts of all motors gave by the end",
             summary=("energy of all motors", "10.3g"), worse="larger",
         ),
@@ -106,7 +121,7 @@ class Motors(Output):
         times, winches = series.times, len(run.coordinates["winch"])
         found = np.full((4, len(times), len(run.locks), winches), np.nan)
         torque, shaft, power, energy = found
-        current, supplied, lost = np.full((3, *torque.shape), np.nan)
+        current, supplied, lost, lagged = np.full((4, *torque.shape), np.nan)
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
             tension, speed, wound, told = series.values[:, plane, end].T
@@ -123,6 +138,13 @@ class Motors(Output):
             # Also of a step at whose end the winch is switched off: its drum turned until then.
             turned = (wound[steps] - wound[before]) / motor.travel
             energy[place] = 0.5 * (given[steps] + given[before]) * turned
+            during = times[steps] - times[before]
+            if motor.speed is not None:
+                command = motor.commanded(times - winch.start_time)[0]
+                late = runs & (speed / motor.travel < (1.0 - _LAGS) * command)
+                # Up to the end of a step at which it is switched off it is as at its beginning.
+                late, until = late[before], np.where(runs[steps], late[steps], late[before])
+                lagged[place] = 0.5 * during * runs[before] * (1.0 * late + until)
             if motor.torque_constant is not None:
                 takes = motor.electrical_power(given, speed / motor.travel)
                 current[place] = np.where(
@@ -130,8 +152,8 @@ class Motors(Output):
                 )
                 supplied[place] = np.where(on, takes[steps], 0.0)
                 loss = takes - given * speed / motor.travel
-                during = np.where(runs, 0.5, 0.0)[before] * (times[steps] - times[before])
-                lost[place] = during * (loss[steps] + loss[before])
+                half = np.where(runs, 0.5, 0.0)[before] * during
+                lost[place] = half * (loss[steps] + loss[before])
         power[:] = torque * shaft
         energy[:] = np.cumsum(energy, axis=0)
         values: Values = {
@@ -145,6 +167,10 @@ class Motors(Output):
             if np.isfinite(own).any():  # no current of motors that do not tell their constant
                 values |= {peak.name: np.nanmax(own)} | peak.of(run, times, own)
         values["total_motor_energy"] = np.nansum(energy[-1])
+        if np.isfinite(lagged).any():
+            known = np.isfinite(lagged).any(axis=0)
+            lag = np.where(known, np.nansum(lagged, axis=0), np.nan)
+            values |= {"motor_lag_duration": lag, "longest_motor_lag": np.nanmax(lag)}
         return values
 
 
@@ -236,6 +262,16 @@ class DriveMargins(Output):
         ),
         Variable("least_drive_margin_time", (), "s", "time of least_drive_margin"),
         Variable("least_drive_margin_angle", (), "degree", "mean opening angle then"),
+        Variable(
+            "least_drive_margin_started", (), "1",
+            "smallest static margin of the drive at any angle passed from the start of the last "
+            "winch on; NaN of runs that ended before",
+            needs=SEVERAL, worse="smaller",
+        ),
+        Variable(
+            "least_drive_margin_started_angle", (), "degree", "mean opening angle then",
+            needs=SEVERAL,
+        ),
         Variable(
             "least_drive_margin_plane", ("plane",), "1",
             "smallest static margin of a plane's own cable against half of all that resists, at "

@@ -68,6 +68,12 @@ class Conditions:
         return min(starts, default=0.0)
 
     @cached_property
+    def started(self) -> float:
+        """When the last winch starts, s."""
+        starts = [winch.start_time for winch in self.winches.values() if turns_ever(winch)]
+        return max(starts, default=0.0)
+
+    @cached_property
     def end(self) -> float:
         """When the last winch is switched off, s; infinite if one never is, or there is none.
 

@@ -189,9 +189,11 @@ def place_of_winch(scene: Scene, cable: int, end: int) -> str:
     return f"cables.{scene.structure.planes[plane]}.{('winch', 'far_winch')[end]}"
 
 
-def _still_off(scene: Scene, drive: DriveMargin, time: float, way: "Passed") -> str:
+def _still_off(
+    scene: Scene, drive: DriveMargin, time: float, way: "Passed", then: "Least | None"
+) -> str:  # fmt: skip
     """What a reason says of winches that start after the time (s) of the least margin, with the
-    least from then on, and of a ring that goes on after all of them have been switched off.
+    least from ``then`` on, and of a ring that goes on after all of them have been switched off.
     """
     late = {
         f"{place_of_winch(scene, *where)} starts at {winch.start_time:g} s": winch.start_time
@@ -201,8 +203,7 @@ def _still_off(scene: Scene, drive: DriveMargin, time: float, way: "Passed") -> 
     told, last, end = "", float(way.times[-1]), drive.conditions.end
     if late:
         told = f"; the least drive margin is that of {time:.4g} s, before {' and '.join(late)}"
-        if (started := max(late.values())) < min(last, end):
-            then = least_along(drive, way.between(started, math.inf))
+        if then is not None:
             told += f": from then on {then.margin:.4g} at {math.degrees(then.angle):.4g} deg"
     over = f"; the least drive margin ends at {end:.4g} s, when the last winch is switched off"
     return told + over * (last > end + AT_ONCE)
@@ -306,7 +307,7 @@ def with_margin(
     kinds = list(dict.fromkeys(kind for _, drive in drives if drive for kind in drive.kinds))
     available, margin = np.full((2, len(times)), np.nan)
     resisting = np.full((len(kinds), len(times)), np.nan)
-    begin, leasts = -math.inf, []
+    begin, leasts, started = -math.inf, [], list[Least]()
     for until, drive in drives:
         at = (way.times >= begin - AT_ONCE) & (way.times < until - AT_ONCE)
         passes = len(way.times) and begin <= way.times[-1] and until > way.times[0]
@@ -318,18 +319,28 @@ def with_margin(
             margin[own] = [min(one.margin, MOST) for one in rows]
             resisting[:, own] = [[one.resisting.get(kind, 0.0) for one in rows] for kind in kinds]
             known = list(zip(clock, rows, strict=True))
-            if begin < drive.conditions.end:
+            full, end = drive.conditions.started, drive.conditions.end
+            if begin < end:
                 leasts.append(least_along(drive, way.between(begin, until), known))
+            if max(begin, full) < min(until, end, way.times[-1]):
+                late = full > way.times[0] + AT_ONCE
+                stretch = way.between(max(begin, full), until)
+                started.append(least_along(drive, stretch, known) if late else leasts[-1])
         begin = until
     values = {"drive_available": available, "drive_resistance": resisting, "drive_margin": margin}
     reason = outcome.reason
     if leasts:
         least = min(leasts)
-        reason += _still_off(scene, last, least.time, way)
+        reason += _still_off(scene, last, least.time, way, min(started, default=None))
         values |= {
             "least_drive_margin": np.asarray(least.margin),
             "least_drive_margin_time": np.asarray(least.time),
             "least_drive_margin_angle": np.asarray(math.degrees(least.angle)),
+        }
+    if started and len(last.conditions.winches) > 1:
+        values |= {
+            "least_drive_margin_started": np.asarray(min(started).margin),
+            "least_drive_margin_started_angle": np.asarray(math.degrees(min(started).angle)),
         }
     by_plane = _by_plane(outcome, drives)
     if np.isfinite(by_plane).any():

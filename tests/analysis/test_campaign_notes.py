@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 from ringsim.analysis.campaign_notes import late_line, peak_lines, reached_by_words, remark_lines
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import not_met
+from ringsim.analysis.study_text import not_met, statistics_table
 from ringsim.analysis.study_text import told as all_told
 from ringsim.analysis.verdicts import verdict_table
 from ringsim.analysis.worst import margin_table
@@ -141,9 +141,9 @@ def test_a_verdict_says_so_if_what_may_be_off_could_change_it() -> None:
             high = scipy.stats.beta.ppf(0.9, kept + 1, 30 - kept) if kept < 30 else 1.0
             stands = low >= 0.8 if most > 50.0 else high < 0.8
             told = f"{sound}, if its numbers hold: may be off in {count} of 30 samples"
-            assert row[3] == (sound if stands else told)
+            assert row[1] == (sound if stands else told)
             gate = not_met(found)
-            assert gate == ([] if stands and most > 50.0 else [f"{row[0]} is {row[3]}"])
+            assert gate == ([] if stands and most > 50.0 else [f"{row[0]} is {row[1]}"])
             seen.add((most, stands))
     assert len(seen) == 4
 
@@ -151,34 +151,46 @@ def test_a_verdict_says_so_if_what_may_be_off_could_change_it() -> None:
 def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> None:
     """With the worst sample from then on."""
     made = made_campaign(4)
-    words = "the least drive margin is that of 0 s, before cables.lower.winch starts at {} s"
-    reasons = [REACHED, *(f"{REACHED}; {words.format(k)}: from then on {m:.3f} at 14 deg"
-                          for k, m in ((1, 0.3), (2, -0.2), (3, 0.1)))]  # fmt: skip
-    made["reason"] = "sample", np.array(reasons, dtype=object)
+    words = "the least drive margin is that of 0 s, before cables.lower.winch starts at 1 s"
+    made["reason"] = "sample", np.array([REACHED, *[f"{REACHED}; {words}"] * 3], dtype=object)
     made["least_drive_margin"] = "sample", np.array([0.1, -0.5, -0.6, -0.7])
+    assert late_line(made) == ""  # of a result that does not tell the other
+    made["least_drive_margin_started"] = "sample", np.array([0.1, 0.3, -0.2, 0.1])
+    made["least_drive_margin_started_angle"] = "sample", np.full(4, 14.0)
     line = (
-        "in 3 of 4 samples the least drive margin is that of a time before cables.lower.winch "
-        "starts; from then on all have at least -0.200 (sample 2, at 14 deg)"
+        "in 3 of 4 samples the least drive margin is that of a time before the last winch "
+        "starts; from then on all have at least -0.2 (sample 2, at 14 deg)"
     )
     table = margin_table(analyse(made))
     assert table.notes[-1] == line.partition(";")[0]
     assert not any("limit / worst value" in note for note in table.notes)  # it is a margin already
-    # The sample without a word on it counts with its own margin, of 0.1.
-    words = "least_drive_margin >= 0 with all winches on"
-    assert table.rows[-1] == (
-        words, "least_drive_margin", "-0.2", "-0.2: NOT enough", "2", "1 of 4"
-    )  # fmt: skip
-    assert late_line(made).startswith(line)
+    name = "least_drive_margin_started"
+    assert table.rows[-1] == (f"{name} >= 0", name, "-0.2", "-0.2: NOT enough", "2", "1 of 4")
+    assert late_line(made) == line
     assert not remark_lines(made)
     # A run that ends before that counts in neither.
-    reasons[2] = reasons[2].partition(": from then on")[0]
-    made["reason"] = "sample", np.array(reasons, dtype=object)
-    (row,) = (row for row in margin_table(analyse(made)).rows if row[0] == words)
+    made[name][2] = np.nan
+    (row,) = (row for row in margin_table(analyse(made)).rows if row[1] == name)
     assert row[2:] == ("0.1", "+0.1", "0", "0 of 3")
-    assert "from then on the 2 that came so far have at least 0.100" in late_line(made)
-    made["reason"] = "sample", np.array([REACHED] * 4, dtype=object)
+    assert "from then on the 3 that came so far have at least 0.1 (" in late_line(made)
+    made[name][:] = np.nan
+    assert late_line(made).endswith("starts, to which no run came")
+    made[name] = made["least_drive_margin"]
     assert late_line(made) == ""
-    assert words not in str(margin_table(analyse(made)).rows)
+    assert name not in str(margin_table(analyse(made)).rows)
+
+
+def test_an_output_that_another_repeats_is_named_instead_of_told_twice() -> None:
+    made = made_campaign(12)
+    made["least_drive_margin"] = "sample", np.linspace(0.1, 0.5, 12)
+    made["least_drive_margin_started"] = made["least_drive_margin"] * (1.0 + 1e-12)
+    found = analyse(made)
+    table, name = statistics_table(found), "least_drive_margin_started"
+    assert name not in [row[0] for row in table.rows]
+    assert f"in all samples {name} is least_drive_margin" in table.notes
+    assert name in [row[0] for row in statistics_table(found, every=True).rows]
+    made[name] = made["least_drive_margin"] + 1e-3
+    assert name in [row[0] for row in statistics_table(analyse(made)).rows]
 
 
 def test_how_many_reach_their_goal_with_each_drawn_fault() -> None:

@@ -243,6 +243,37 @@ def test_a_stretch_between_two_output_times_counts() -> None:
     assert 0.42 - 1e-9 <= float(found.values["least_drive_margin_time"]) <= 0.48 + 1e-9
 
 
+def test_the_margin_from_the_start_of_the_last_winch_on() -> None:
+    """The least of both cables lies at 60 deg, which a second winch from 0.5 s on never sees: at
+    90 deg it pulls with, and from there on the margin of both grows.
+    """
+    plain = {"joints__vjoint": {"coulomb": 0.01}, "margin": PLAIN.model_dump()}
+    plain |= {f"cables__{plane}__friction": {"kind": "none"} for plane in PLANES}
+    late = plain | {"cables__lower__winch__start_time": 0.5}
+    found = with_margin(opened(0.05), ring(**late)).values
+    assert found["least_drive_margin"] == pytest.approx(
+        virtual_work(ONE, math.radians(60.0)), rel=1e-6
+    )
+    best = min(virtual_work(BOTH, math.radians(angle)) for angle in np.linspace(90.0, 179.9, 50))
+    assert found["least_drive_margin_started"] == pytest.approx(best, rel=2e-2)
+    at = float(found["least_drive_margin_started_angle"])
+    assert found["least_drive_margin_started"] == pytest.approx(
+        virtual_work(BOTH, math.radians(min(at, 179.99))), abs=2e-3 * abs(best) + 1e-6
+    )
+    # Of a run that ended before, and of one winch alone, there is none.
+    short = opened(0.05, lock=math.nan)
+    for name in ("opening_angle",):
+        short.values[name][:, :, 8:] = np.nan
+    assert "least_drive_margin_started" not in with_margin(short, ring(**late)).values
+    single = with_margin(opened(0.05), ring(**plain, cables__lower="none")).values
+    assert "least_drive_margin_started" not in single
+    # A scene before that had its second winch late counts up to the restart.
+    both = with_margin(opened(0.05), ring(**plain), [(0.6, ring(**late))]).values
+    assert both["least_drive_margin_started"] == pytest.approx(
+        found["least_drive_margin_started"], rel=1e-9
+    )
+
+
 def test_each_plane_has_the_margin_of_its_own_cable_along_its_own_angles() -> None:
     """A jam in the lower cable at 0.5 s, at 90 deg, which the mean of both planes all but hides."""
     plain = {"joints__vjoint": {"coulomb": 0.01}, "margin": PLAIN.model_dump()}

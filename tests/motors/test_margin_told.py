@@ -106,7 +106,14 @@ def test_a_run_says_that_its_least_margin_waits_for_a_winch(scene: Scene) -> Non
     later = float(run.drive_margin.where(run.time >= 0.25).min())
     assert float(then) == pytest.approx(later, abs=2e-3)
     assert float(run.least_drive_margin_time) == 0.0
-    assert "least drive margin" not in simulate(scene, fidelity="frame").attrs["reason"]
+    least = float(run.least_drive_margin_started)
+    assert least == pytest.approx(float(then), rel=1e-3)
+    angle = float(run.least_drive_margin_started_angle)
+    margin = DriveMargin(scene, EcssMechanisms()).at(np.radians(angle)).margin
+    assert least == pytest.approx(margin, rel=1e-6)
+    even = simulate(scene, fidelity="frame")
+    assert "least drive margin" not in even.attrs["reason"]
+    assert float(even.least_drive_margin_started) == float(even.least_drive_margin)
 
 
 def test_a_dead_winch_is_told_beside_a_strong_one(scene: Scene, tmp_path: Path) -> None:

@@ -191,6 +191,38 @@ def test_rotors_keep_what_the_rope_does_not_get(fidelity: str) -> None:
     assert given == pytest.approx(work / 0.6 + kept, rel=2e-3)
 
 
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_motors_tell_how_long_they_were_slower_than_commanded(fidelity: str) -> None:
+    """As the courses of their speeds show; the stowed ring asks for more than they have."""
+    weak = MOTOR | {"speed": 300.0}
+    ramped = weak | {"ramp": 0.2, "rotor_inertia": 1e-7}
+    scene = ring(
+        structure__sections=3, record__interval=0.005, solver__end_time=0.5,
+        joints__vjoint={"coulomb": 0.3}, cables__lower__winch__stop_time=0.3,
+    )  # fmt: skip
+    found = simulate(
+        scene.with_values({
+            "cables.upper.winch.winding": ramped, "cables.lower.winch.winding": weak,
+        }), fidelity,
+    )  # fmt: skip
+    speed, time = found.motor_speed.isel(winch=0), found.time
+    phase = np.clip(time / 0.2, 0.0, 1.0)
+    command = {"upper": 300.0 * phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2),
+               "lower": xr.where(time < 0.3, 300.0, 0.0)}  # fmt: skip
+    truth = {
+        plane: 0.005 * int((speed.sel(plane=plane) < 0.99 * told).sum())
+        for plane, told in command.items()
+    }
+    lag = found.motor_lag_duration.isel(winch=0)
+    for plane, counted in truth.items():
+        assert lag.sel(plane=plane) == pytest.approx(counted, abs=0.011)
+    assert max(truth.values()) > 0.05
+    assert found.longest_motor_lag == lag.max()
+    plain = {f"cables.{p}.winch.winding": MOTOR for p in ("upper", "lower")}
+    without = simulate(scene.with_values(plain | {"solver.end_time": 0.1}), "frame")
+    assert np.isnan(without.motor_lag_duration).all()  # nothing is commanded
+
+
 def test_a_ramp_takes_the_jump_from_the_first_steps() -> None:
     peaks = {}
     for ramp in (None, 0.5):

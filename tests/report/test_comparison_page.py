@@ -68,7 +68,7 @@ def test_what_may_be_off_is_told_with_verdicts_and_figures(
     )
     found = compare(one, other)
     for side, each in enumerate((one, other)):
-        words = {row[0]: row[3] for row in verdict_table(analyse(each)).rows}
+        words = {row[0]: row[1] for row in verdict_table(analyse(each)).rows}
         texts = found["requirement"].values
         assert found["kept_verdict_text"].values[:, side].tolist() == [words[t] for t in texts]
     (table, *_) = sections(found)["requirements"].tables
