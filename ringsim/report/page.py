@@ -274,7 +274,8 @@ def page(
             found.setdefault(int(sample), []).append(what.removeprefix("no value: "))
     fell_short, more = failures(campaign, folder, found)
     short = ~np.isin(endings(campaign), (*REACHED, UNKNOWN, NOT_RUN))
-    shown = player(campaign, analysis)
+    apart = [] if measurement is None else residuals(campaign, measurement)  # refuses others' tests
+    shown = player(campaign, analysis, measurement)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = values_of(campaign)
     told = sections(analysis, folder)
@@ -306,7 +307,6 @@ def page(
     }  # fmt: skip
     figures = [(p.name, p.words, f) for p, f in pictures if matters or p.name != _MATTERS]
     if measurement is not None:
-        apart = residuals(campaign, measurement)
         told["measured"] = Section("measured", "Measured data", [residual_table(apart)])
         title = measurement.file.title or measurement.file.name
         figures.append((

@@ -73,13 +73,24 @@
     return `rgb(${mix})`;
   }
 
+  // V-joint and opening angle in degree of each encoder that has readings about a time.
+  function measuredAt(moment) {
+    return data.measured
+      .filter(({ times }) => times.length > 1 && moment >= times[0] && moment <= times[times.length - 1])
+      .map(({ joint, times, angles }) => {
+        const [k, w] = between(times, moment);
+        return [joint, angles[k - 1] + w * (angles[k] - angles[k - 1])];
+      });
+  }
+
   const largest = new Map();
   function mostLag() {
     if (!largest.has(sample)) {
       let most = 0.01;
       for (const moment of sample.times) {
         const angles = anglesAt(moment), mean = angles.reduce((a, b) => a + b, 0) / joints;
-        for (const angle of angles) if (Math.abs(angle - mean) > most) most = Math.abs(angle - mean);
+        const every = [...angles, ...measuredAt(moment).map((each) => each[1])];
+        for (const angle of every) if (Math.abs(angle - mean) > most) most = Math.abs(angle - mean);
       }
       largest.set(sample, most);
     }
@@ -164,6 +175,17 @@
         dot(x(n), y(angle - mean), 4.5, angle - mean, angle > 179.99);
       }
     });
+    for (const [joint, angle] of measuredAt(time)) {
+      const [across, down] = [x(joint % count), y(angle - mean)];
+      pen.beginPath();
+      for (const [i, j] of [[-7, 0], [0, -7], [7, 0], [0, 7]]) pen.lineTo(across + i, down + j);
+      pen.closePath();
+      pen.lineWidth = 2;
+      pen.strokeStyle = "#d55e00";
+      pen.setLineDash(joint < count ? [] : [3, 2]);
+      pen.stroke();
+      pen.setLineDash([]);
+    }
   }
 
   function draw() {

@@ -14,6 +14,7 @@ from ringsim.analysis.design import REACHED, UNKNOWN, endings, judged_by, median
 from ringsim.analysis.intervals import used
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.points import Points, points_of
+from ringsim.measured import Measurement
 from ringsim.plots.campaign.frame import base_of, of_cases
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import COMPUTED, FROM_ANGLES, middle_of
@@ -28,12 +29,15 @@ _MOST_BYTES, _LEAST_FRAMES = 42_000, 30
 """Of the positions of a sample: ten samples and all figures are to fit into one mail."""
 
 
-def player(campaign: xr.Dataset, analysis: xr.Dataset) -> dict[str, Any] | None:
+def player(
+    campaign: xr.Dataset, analysis: xr.Dataset, measurement: Measurement | None = None
+) -> dict[str, Any] | None:  # fmt: skip
     """Data of the player for JSON; None if the structure has no joints that open between two rods,
     or nothing was recorded.
 
     Shown are the median, or the base case of single changes, and the worst sample, the worst of
-    each failure in ``analysis``, then others that failed.
+    each failure in ``analysis``, then others that failed; beside them what encoders of a
+    ``measurement`` read.
     """
     scene = scene_from_toml(str(campaign.attrs["scene"]), source="attribute scene")
     if "opening_angle" not in campaign or not points_of(layout_of(scene)).openings.size:
@@ -48,7 +52,22 @@ def player(campaign: xr.Dataset, analysis: xr.Dataset) -> dict[str, Any] | None:
         "words": words, "planes": campaign["plane"].values.tolist(),
         "sections": campaign["section"].values.tolist(),
         "samples": shown, "ring": _poses(scene, np.radians(lowest)),
+        "measured": [] if measurement is None else _encoders(campaign, measurement),
     }  # fmt: skip
+
+
+def _encoders(campaign: xr.Dataset, measurement: Measurement) -> list[dict[str, Any]]:
+    """Number of the V-joint, times (s) and opening angles (deg) of each encoder of a test."""
+    planes, sections = (campaign[name].values.tolist() for name in ("plane", "section"))
+    found = []
+    for each in measurement.readings:
+        if each.sensor.variable == "opening_angle" and len(each.times):
+            place = each.sensor.place
+            joint = planes.index(place["plane"]) * len(sections) + sections.index(place["section"])
+            few = np.unique(np.linspace(0, len(each.times) - 1, MOST_FRAMES).round().astype(int))
+            times, values = np.round(each.times[few], 4), np.round(each.values[few], 3)
+            found.append({"joint": joint, "times": times.tolist(), "angles": values.tolist()})
+    return found
 
 
 def _chosen(campaign: xr.Dataset, analysis: xr.Dataset) -> list[tuple[int, str]]:

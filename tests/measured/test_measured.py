@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -387,6 +388,14 @@ def test_page_of_a_campaign_shows_the_test_beside_its_samples(
     text = page.read_text()
     assert 'id="figure-measured"' in text
     assert "All sensors: 3 of 3 readings (1) lie in it" in text
+    shown = json.loads(re.search(r'id="player-data">(.*?)</script>', text, re.S)[1])
+    (encoder,) = shown["measured"]
+    joints = [(plane, section) for plane in shown["planes"] for section in shown["sections"]]
+    assert joints[encoder["joint"]] == ("upper", 2)
+    assert encoder["times"] == at.tolist()
+    (one,) = load_measured(file).readings
+    np.testing.assert_allclose(encoder["angles"], one.values, atol=5e-4)
+    assert "encoders against that mean" in text
     told = shell.invoke(cli, ["compare", str(folder), str(file)])
     assert "all sensors: 3 of 3 readings (1) lie in it" in told.output
     page = tmp_path / "dossier.html"

@@ -49,7 +49,17 @@ canvas.setPointerCapture = () => {};
 drag("pointerdown", 50); drag("pointermove", 90); drag("pointerup", 90);
 seen.turned = before !== shot();
 before = shot();
-choose("view", "lag"); seen.viewed = before !== shot(); choose("view", "ring");
+const diamonds = () => {
+  const all = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  const rows = [];
+  for (let k = 0; k < all.length; k += 4) {
+    const vermilion = all[k] === 213 && all[k + 1] === 94 && all[k + 2] === 0;
+    if (vermilion) rows.push(Math.floor(k / 4 / canvas.width));
+  }
+  return rows.length ? [rows[0] / canvas.height, rows[rows.length - 1] / canvas.height] : [];
+};
+choose("view", "lag"); seen.viewed = before !== shot(); seen.diamond = diamonds();
+choose("view", "ring");
 choose("sample", "2"); seen.failed = told.textContent; choose("sample", "0");
 const slider = document.getElementById("moment"), play = document.getElementById("play");
 slider.value = 0;
@@ -84,6 +94,10 @@ def test_the_page_plays_offline(
         monkeypatch.setattr(figures, "PICTURES", figures.PICTURES[:1])
     campaign = made_campaign(8, failed=(2, 5))
     text = page(with_positions(campaign) if computed else campaign, "runs/made")
+    # An encoder at the V-joint upper 2, far ahead of the mean: the view by section takes it in.
+    encoder = {"joint": 1, "times": [0.0, 10.0], "angles": [40.0, 200.0]}
+    text = text.replace('"measured": []', f'"measured": [{json.dumps(encoder)}]', 1)
+    assert '"angles": [40.0' in text
     assert f"Drawn: {COMPUTED if computed else FROM_ANGLES}." in text
     text = text.replace("<head>", HEAD, 1).replace("</body>", TAIL, 1)
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
@@ -102,6 +116,8 @@ def test_the_page_plays_offline(
     assert seen["resources"] == 0
     assert seen["turned"]
     assert seen["viewed"]
+    # Ahead of all V-joints, above the middle of the axis; it stays on the sheet.
+    assert 0.02 < seen["diamond"][0] < seen["diamond"][1] < 0.4
     assert " s of 10.00 s" in seen["first"]
     assert " s of 4.00 s" in seen["failed"]
     assert (seen["button"], seen["stopped"]) == ("Pause", "Play")
