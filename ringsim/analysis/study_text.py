@@ -316,7 +316,7 @@ def not_met(analysis: xr.Dataset) -> list[str]:
     left = [f"{samples - run} of {samples} samples have not run"] if run < samples else []
     each = [verdict_about(analysis, name) for name in analysis["requirement"].values]
     bad = [
-        f"{one['requirement_text']} is {verdict_text(one)}" for one in each
+        f"{one['requirement_text']}: {verdict_text(one)}" for one in each
         if one["verdict"] != Verdict.MET or one["verdict_may_change"]
     ]  # fmt: skip
     return [*bad, *left]

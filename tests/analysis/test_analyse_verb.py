@@ -91,7 +91,7 @@ def test_a_requirement_of_the_command_line_replaces_the_file_s(study):
 def test_the_gate_is_closed_until_every_requirement_is_met(study, tmp_path):
     every = ringsim("analyse", str(study), "--gate", folder=tmp_path)
     assert every.returncode == 4
-    assert "gate closed: outcome is deployed is not met; deployment_time" in every.stderr
+    assert "gate closed: outcome is deployed: not met; deployment_time" in every.stderr
     words = "probability 0.2, confidence 0.9"  # half deploys
     wanted = f"outcome: is deployed, {words}", f"deployment_time: max 30 s, {words}"
     open_ = [word for each in wanted for word in ("--require", each)]
@@ -100,7 +100,7 @@ def test_the_gate_is_closed_until_every_requirement_is_met(study, tmp_path):
     unsure = "--require", "outcome: is deployed, probability 0.5, confidence 0.9"
     late = ringsim("analyse", str(study), "--gate", *open_[2:], *unsure, folder=tmp_path)
     assert late.returncode == 4
-    assert "outcome is deployed is not yet shown" in late.stderr
+    assert "outcome is deployed: not yet shown" in late.stderr
 
 
 def test_a_bound_may_have_its_unit_and_no_other(study):

@@ -143,7 +143,7 @@ def test_a_verdict_says_so_if_what_may_be_off_could_change_it() -> None:
             told = f"{sound}, if its numbers hold: may be off in {count} of 30 samples"
             assert row[1] == (sound if stands else told)
             gate = not_met(found)
-            assert gate == ([] if stands and most > 50.0 else [f"{row[0]} is {row[1]}"])
+            assert gate == ([] if stands and most > 50.0 else [f"{row[0]}: {row[1]}"])
             seen.add((most, stands))
     assert len(seen) == 4
 
