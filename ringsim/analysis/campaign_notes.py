@@ -41,7 +41,7 @@ from ringsim.analysis.intervals import (
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
-from ringsim.outputs.base import DOUBT, may_be_off
+from ringsim.outputs.base import DOUBT, UNCERTAIN, may_be_off
 from ringsim.sampling.distributions import labels_of
 from ringsim.tables import (
     Table,
@@ -376,6 +376,13 @@ def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], str]:
         if value := _SETTING.search(cure):
             cures.append((float(value[1]), cure))
     return found, min(cures, default=(0.0, ""))[1]
+
+
+def uncertain_latches(campaign: xr.Dataset) -> Mask:
+    """Which samples say that it is uncertain whether one of their latches catches."""
+    reasons = campaign["reason"].to_numpy() if "reason" in campaign else np.array([])
+    said = [UNCERTAIN in str(reason) for reason in reasons] or [False] * campaign.sizes["sample"]
+    return np.asarray(good(campaign) & np.array(said))
 
 
 _SETTING = re.compile(r"= ([\d.e+-]+)")

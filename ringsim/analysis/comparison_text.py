@@ -152,15 +152,15 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
     for some, sense in (
         (turned, "turn round: samples that are bad in one are good in the other"),
         (tend, "tend to turn round: samples that are bad in one are rather good in the other"),
-        (apart, "go together little: one tells little of which samples of the other are bad"),
+        (apart, "hardly go together: which samples are bad in one tells little of the other"),
     ):
         if some:
             named = ", ".join(f"{name} ({each:+.2f})" for name, each in some.items())
             yield f"the ranks of pairs {sense} (rank correlation): {named}"
     if still:
         yield (
-            f"the ranks of pairs say little of {', '.join(still)}: in one of the two the samples "
-            f"scatter by less than {100 * _STILL:g} % of their mean"
+            f"the ranks of pairs say little of {', '.join(still)}: in one of the two, or in both, "
+            f"the samples scatter by less than {100 * _STILL:g} % of their mean"
         )
 
 
@@ -292,7 +292,7 @@ def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
     told = "differences within the numerical errors (root sum of squares of the error bars of both)"
     alone = "intervals are of sampling alone; " * (not found.attrs["runs"])
     return [f"{told}: {', '.join(within)}"] * bool(within) + [
-        f"{alone}numerical errors that both share cancel"
+        f"{alone}numerical errors that both share cancel, others add"
     ]
 
 

@@ -538,7 +538,9 @@ def _correlations(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ..
 def _signed(value: float, ends: Array) -> str:
     if not np.isfinite(value):
         return "-"
-    interval = _ends(ends)
+    interval, (low, high) = _ends(ends), ends.tolist()
+    if high - low < 0.01:  # it has no digit more than the correlation
+        interval = f"{low:.2f} .. {high:.2f}"
     return f"{value:+.2f}" + ("" if interval == "-" else f" ({interval})")
 
 

@@ -384,7 +384,7 @@ def changes(campaign: xr.Dataset, step: float = STEP) -> tuple[list[Change], dic
             both, own = (law, other), str(variable.name)
             found.append(Change(name, of + places, " -> ".join(told), own, both))
         if isinstance(law, Uniform):
-            left.setdefault("means: no sample outside the bounds to weigh up", []).append(name)
+            left.setdefault("means of uniform inputs: no samples beyond bounds", []).append(name)
         elif len(found) == count:
             left.setdefault("without a mean and a standard deviation of its own", []).append(name)
     return found, left

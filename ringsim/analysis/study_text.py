@@ -25,10 +25,12 @@ from ringsim.analysis.influence_text import (
     what_separates,
 )
 from ringsim.analysis.intervals import (
+    ALIKE,
     LEAST_OF_BOOTSTRAP,
     NOTHING,
     ONE_DECIDES,
     all_alike,
+    hardly_apart,
     is_moment,
     numbers,
     of_one,
@@ -349,7 +351,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     only if ``every`` one is told.
     """
     rows, few, alike, within = [], False, list[str](), list[str]()
-    known, again = dict[str, Array](), list[str]()
+    known, again, flat = dict[str, Array](), list[str](), list[str]()
     wanted = analysis["requirement"].values if "requirement" in analysis.dims else ()
     for name in outputs_in(analysis):
         if is_moment(name) and not every:
@@ -369,6 +371,10 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
             again.append(f"{name} is {twin}")
             continue
         known[name] = values
+        if hardly_apart(least, most) and not every and name not in wanted and np.isnan(bar):
+            ends = f"{fine_text(least, fine)} .. {fine_text(most, fine)}"
+            flat.append(f"{name} {ends} {units}".rstrip() + f" (in {count})" * int(used < run))
+            continue
         if np.isfinite(bar):
             inside = f", mean {fine_text(mean, fine)}" * bool(np.isfinite(mean))
             told = f"{fine_text(least, fine)} .. {fine_text(most, fine)} {units}".rstrip()
@@ -388,6 +394,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         "least", "most", "worst sample", "samples used",
     )  # fmt: skip
     notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
+    notes += [f"samples differ by less than {100 * ALIKE:g} %: {', '.join(flat)}"] * bool(flat)
     notes += [f"in all samples {', '.join(again)}"] * bool(again)
     if any(row[-2] == "-" for row in rows):
         notes.append("no worst sample of outputs of which nothing says which end is worse")

@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ringsim.analysis.campaign_notes import LATE, doubtful, marked
+from ringsim.analysis.campaign_notes import LATE, doubtful, marked, uncertain_latches
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import (
     Interval,
@@ -230,6 +230,8 @@ def judge(
     for name, wanted in requirements.items():
         require_values(campaign, name)
         off = doubted.get(name, none)
+        if name in (OUTCOME, "latched_joints"):
+            off = off | uncertain_latches(campaign)
         for key, value in _judged(campaign, name, wanted, placed, rule, off).items():
             columns[key].append(value)
     known = {
@@ -264,7 +266,13 @@ _MEANING = {
     "samples_lost": ("samples whose run failed", "i8"),
     "samples_violating": ("samples used that violate the requirement", "i8"),
     "samples_without_value": ("of these, samples without a value", "i8"),
-    "samples_may_be_off": ("samples used whose value may be off, by what their runs say", "i8"),
+    "samples_may_be_off": (
+        "samples used whose value may be off, by what their runs say, or that are closer to the "
+        "limit than the numerical error", "i8"),
+    "samples_close": ("of these, samples closer to the limit than the numerical error", "i8"),
+    "numerical_error": (
+        "root mean square of the error bars of the samples that have them, in the output's unit",
+        "f8"),
     "verdict_may_change": ("whether those could change the verdict, were they wrong", "i1"),
     "samples_short": ("samples that meet it and ended before their goal", "i8"),
     "further_samples": (
@@ -282,6 +290,8 @@ def _judged(
 ) -> dict[str, float]:  # fmt: skip
     used, gone = good(campaign), lost(campaign)
     broken = violations(campaign, name, wanted)
+    close, error = _close(campaign, name, wanted)
+    off = used & (off | close)
     absent = used & np.isnan(numbers(campaign, name)) if name != OUTCOME else ~used & used
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
     short = used & ~broken & _ended_short(campaign)
@@ -327,9 +337,23 @@ def _judged(
         "samples_used": count, "samples_lost": missing, "samples_violating": bad,
         "samples_without_value": int(absent.sum()),
         "samples_may_be_off": int(off.sum()), "verdict_may_change": change,
+        "samples_close": int((used & close).sum()), "numerical_error": error,
         "samples_short": int(short.sum()) if name != OUTCOME else 0,
         "further_samples": further,
     }  # fmt: skip
+
+
+def _close(campaign: xr.Dataset, name: str, wanted: Requirement) -> tuple[Mask, float]:
+    """Which samples are closer to the limit than their numerical error, and that error: the root
+    mean square of the error bars of all samples that have them, which samples without one take.
+    """
+    if name == OUTCOME or f"{name}_error" not in campaign:
+        return np.zeros(campaign.sizes["sample"], dtype=bool), np.nan
+    bars = np.where(good(campaign), numbers(campaign, f"{name}_error"), np.nan)
+    known = np.isfinite(bars)
+    error = float(np.sqrt(np.mean(bars[known] ** 2))) if known.any() else np.nan
+    apart = np.abs(wanted.beyond(numbers(campaign, name)))
+    return np.asarray(apart < np.where(known, bars, error)), error
 
 
 def verdict_text(one: Mapping[str, Any]) -> str:
@@ -373,6 +397,25 @@ def verdict_about(analysis: xr.Dataset, name: str) -> dict[str, Any]:
     """All about one requirement."""
     variables = analysis.sel(requirement=name).variables
     return {str(n): v.values.item() for n, v in variables.items() if not v.dims}
+
+
+def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
+    """Why a verdict may change, and what settles it."""
+    close, others = one["samples_close"], one["samples_may_be_off"] - one["samples_close"]
+    told = []
+    if close:
+        error = with_unit(number_text(one["numerical_error"], 2), quantities()[name].units)
+        told.append(
+            f"{name}: in {counted(close, 'sample')} it is closer to the limit than its numerical "
+            f"error, {error} (root mean square of error bars): a smaller solver.tolerance settles "
+            "it"
+        )
+    if others and name in (OUTCOME, "latched_joints"):
+        told.append(
+            f"{name}: in {counted(others, 'sample')} it is uncertain whether all latches catch, as "
+            "another joint locks in the same step: a smaller solver.tolerance settles it"
+        )
+    return told
 
 
 def verdict_table(analysis: xr.Dataset) -> Table:
@@ -424,6 +467,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
                 f"{name}: {short} of the {held} samples that meet it ended before the antenna was "
                 f"deployed, and might have violated it later{hint}"
             )
+        if one["verdict_may_change"]:
+            notes += _doubts(one, str(name))
         signs = [kind.key for kind in KINDS if f" {kind.sign} " in one["requirement_text"]]
         if doubt := doubt_of(name, signs):
             notes.append(f"{one['requirement_text']}: {doubt}")

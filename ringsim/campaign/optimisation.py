@@ -427,17 +427,20 @@ class _Course:
             _write(self)
 
 
-def first_order(given: Given) -> tuple[Order, int, int]:
-    """The verdict on the present design, which stands for all; about how many runs an optimisation
-    has (two checks by more samples for each design on the front, and one of the present: how many
-    rounds it takes nobody knows); and how many are checked by the other engine.
+def first_order(given: Given) -> tuple[Order, int, int, str]:
+    """The verdict on the present design, which stands for all; about how many runs there are (how
+    many rounds of checks nobody knows), and how many by the other engine; the runs in words.
     """
     budget, chosen = given.budget, given.problem.front
     every = given.present.specification.check_every
-    runs = (budget.designs + chosen * len(budget.variables)) * budget.samples
-    runs += (1 + 2 * chosen) * budget.check + (1 + chosen) * budget.verdict
+    parts = (
+        (budget.designs + chosen * len(budget.variables), budget.samples, "designs searched"),
+        (1 + 2 * chosen, budget.check, "checks"), (1 + chosen, budget.verdict, "verdicts"),
+    )  # fmt: skip
+    runs = sum(count * samples for count, samples, _ in parts)
+    told = " + ".join(f"{count} {what} x {samples}" for count, samples, what in parts)
     checks = -(-budget.verdict // every) if every else 0
-    return Order(given.present, Path()), runs, (1 + chosen) * checks
+    return Order(given.present, Path()), runs, (1 + chosen) * checks, told
 
 
 def run_optimisation(

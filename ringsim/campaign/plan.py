@@ -139,10 +139,10 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
 
 
 def plan_of_course(
-    order: Order, runs: int, checks: int, workers: int, say: Callable[[str], None]
-) -> list[str]:
+    order: Order, runs: int, checks: int, told_runs: str, workers: int, say: Callable[[str], None]
+) -> list[str]:  # fmt: skip
     """What campaigns one after the other cost that are like an order, with no runs yet: so many
-    runs, and checks by the judging engine; arguments and lines as of ``plan``.
+    runs, which are ``told_runs``, and checks by the judging engine; lines as of ``plan``.
     """
     table = order.campaign.draw()
     todo = np.arange(table.samples)
@@ -151,7 +151,7 @@ def plan_of_course(
     each, (told,), size = _predicted(order, table, none, todo, lambda sample: sample, 0, say)
     seconds = float(each.mean()) * runs
     lines = [*map(extent_told, table.columns), f"  workers        {workers}"]
-    lines += [f"  cost           about {counted(runs, 'run')}, {told}"]
+    lines += [f"  cost           about {counted(runs, 'run')} ({told_runs}), {told}"]
     if checks:
         own, (told,), _ = _predicted(order, table, none, todo, check_of, 0, say, float(each.mean()))
         lines += [f"  checks         {checks} with the full engine, {told}"]

@@ -195,7 +195,7 @@ def replay_command(
         click.echo(result.log)
     name = f"{'check of ' * check}sample {sample}"
     how = result.fate.words if result.fate else result.status.word
-    click.echo(f"{name}: {how}: {result.reason}; it took {result.seconds:.2f} s")
+    click.echo(f"{name}: {how}: {result.reason}; computed in {result.seconds:.2f} s")
     if save is not None:
         from ringsim.dataset import to_dataset
 

@@ -354,29 +354,29 @@ def _course(
     if dry_run:
         from ringsim.sampling.distributions import law_text
 
-        def first() -> tuple[Order, int, int]:
+        def first() -> tuple[Order, int, int, str]:
             found = given()
             if not planning:
                 found.require_readings()
             for name, law in found.budget.clock:
                 if law is not None:
                     click.echo(f"  clock.{name}: {law_text(law.model_dump(mode='json'))}")
-            return Order(found.campaign, Path()), found.members * found.budget.stages, 0
+            runs, told = found.members * found.budget.stages, f"{found.budget.stages} stages"
+            return Order(found.campaign, Path()), runs, 0, f"{told} x {found.members}"
 
         return _plan(first, workers)
     ended, path = run_course(given, _most(workers), out, planning=planning)
     return _told(ended, path, tables, plot=plot)
 
 
-def _plan(first: Callable[[], tuple[Any, int, int]], workers: int | None) -> int:
-    """Print what a course of campaigns would cost: an order that stands for all, and how many runs
-    and checks they have.
+def _plan(first: Callable[[], tuple[Any, int, int, str]], workers: int | None) -> int:
+    """Print what a course of campaigns would cost: an order that stands for all, how many runs and
+    checks they have, and what they are.
     """
     from ringsim.campaign.plan import plan_of_course
 
-    order, runs, checks = first()
     cores = _most(workers) or launched_size()
-    for line in plan_of_course(order, runs, checks, cores, partial(click.echo, err=True)):
+    for line in plan_of_course(*first(), cores, partial(click.echo, err=True)):
         click.echo(line)
     return EXIT_DONE
 

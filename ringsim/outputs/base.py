@@ -166,6 +166,8 @@ DOUBT = " ?"
 """Stands behind what may be off, wherever it is told."""
 
 
+UNCERTAIN = "catches is uncertain"
+"""What a reason says of a latch that a lock in the same step may have driven or braked."""
 _DOUBTFUL = 2.5
 """Factor between a rate and the least that a latch asks for, within which a lock may decide."""
 
@@ -195,7 +197,7 @@ def jerked(run: Run) -> str:
     names = ", ".join(f"{planes[plane]} {section + 1}" for plane, section in late[:_NAMED])
     more = f" and {len(late) - _NAMED} more" if len(late) > _NAMED else ""
     return (
-        f"; whether the latch of {names}{more} catches is uncertain, as another joint locked in "
+        f"; whether the latch of {names}{more} {UNCERTAIN}, as another joint locked in "
         f"the same step: reduce {_cure(run)}"
     )
 

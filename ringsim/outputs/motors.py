@@ -83,7 +83,7 @@ class Motors(Output):
         ),
         Variable(
             "longest_motor_lag", (), "s",
-            "longest such time of any motor",
+            "longest time that any motor was slower than commanded",
             summary=("a motor was slower than commanded", "10.3g"), worse="larger",
             largest_of="motor_lag_duration",
         ),
@@ -261,7 +261,9 @@ class DriveMargins(Output):
             summary=("least drive margin", "10.3f"), worse="smaller", least_of="drive_margin",
         ),
         Variable("least_drive_margin_time", (), "s", "time of least_drive_margin"),
-        Variable("least_drive_margin_angle", (), "degree", "mean opening angle then"),
+        Variable(
+            "least_drive_margin_angle", (), "degree", "mean opening angle at the least drive margin"
+        ),
         Variable(
             "least_drive_margin_started", (), "1",
             "smallest static margin of the drive at any angle passed from the start of the last "
@@ -269,7 +271,8 @@ class DriveMargins(Output):
             needs=SEVERAL, worse="smaller",
         ),
         Variable(
-            "least_drive_margin_started_angle", (), "degree", "mean opening angle then",
+            "least_drive_margin_started_angle", (), "degree",
+            "mean opening angle at the least drive margin from the start of the last winch on",
             needs=SEVERAL,
         ),
         Variable(

@@ -148,6 +148,57 @@ def test_a_verdict_says_so_if_what_may_be_off_could_change_it() -> None:
     assert len(seen) == 4
 
 
+def test_a_verdict_says_so_if_numerical_errors_could_change_it() -> None:
+    """Tensions of 20 to 49 N; two samples have error bars, whose root mean square the others take.
+    The verdict stands if it is the same with all close samples on either side.
+    """
+    made, seen = made_campaign(30), set()
+    for bars in ((0.3, 0.4), (3.0, 4.0), (9.0, 12.0)):
+        error = np.full(30, np.nan)
+        error[[0, 20]] = bars
+        made["peak_tension_error"] = "sample", error
+        own = np.where(np.isfinite(error), error, np.hypot(*bars) / np.sqrt(2.0))
+        for limit in (44.5, 48.6, 53.0, 60.0, 30.5):
+            wanted = {"peak_tension": {"max": limit, "probability": 0.8, "confidence": 0.9}}
+            found = analyse(made, wanted)
+            values = 20.0 + np.arange(30.0)
+            ends = []
+            for kept in (values + own < limit, values - own < limit):
+                n = int(kept.sum())
+                low = scipy.stats.beta.ppf(0.1, n, 31 - n) if n else 0.0
+                high = scipy.stats.beta.ppf(0.9, n + 1, 30 - n) if n < 30 else 1.0
+                ends.append(2 if low >= 0.8 else 0 if high < 0.8 else 1)
+            table = verdict_table(found)
+            verdict, stands = found.verdict.item(), ends[0] == ends[1]
+            close = int((np.abs(values - limit) < own).sum())
+            assert found.samples_close.item() == close
+            told = f"if its numbers hold: may be off in {close} of 30 samples"
+            assert (told in table.rows[0][1]) == (not stands and verdict != 1)
+            (note,) = [n for n in table.notes if "closer to the limit" in n] or [""]
+            assert bool(note) == (not stands and verdict != 1)
+            if note:
+                assert f"in {close} sample" in note
+                assert f"error, {np.hypot(*bars) / np.sqrt(2.0):.2g} N (" in note
+                assert not_met(found) == [f"{table.rows[0][0]}: {table.rows[0][1]}"]
+            seen.add((verdict, stands))
+    assert {(2, True), (2, False), (0, True)} <= seen
+
+
+def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
+    made = made_campaign(30)
+    wanted = {"outcome": {"is": "deployed", "probability": 0.8, "confidence": 0.9}}
+    words = "; whether the latch of upper 3 catches is uncertain, as another joint locked"
+    for count, stands in ((1, True), (2, True), (3, False), (30, False)):
+        made["reason"] = "sample", np.array([REACHED + words * (k < count) for k in range(30)])
+        found = analyse(made, wanted)
+        low = scipy.stats.beta.ppf(0.1, 30 - count, 1 + count) if count < 30 else 0.0
+        assert (low >= 0.8) == stands
+        table = verdict_table(found)
+        told = f"met, if its numbers hold: may be off in {count} of 30 samples"
+        assert table.rows[0][1] == ("met" if stands else told)
+        assert any("uncertain whether all latches catch" in n for n in table.notes) != stands
+
+
 def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> None:
     """With the worst sample from then on."""
     made = made_campaign(4)
