@@ -20,12 +20,7 @@ from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winches import Winches
 from ringsim.core.chain import Chain, Seen
 from ringsim.core.library import call
-from ringsim.core.tension import (
-    Drums,
-    RopeTable,
-    Spans,
-    factors_needed,
-)
+from ringsim.core.tension import Drums, RopeTable, Spans
 from ringsim.frame.elimination import Border
 from ringsim.frame.laws import Tape, taped
 from ringsim.frame.mesh import Indices, Mesh, Parts, Skeleton
@@ -154,7 +149,7 @@ class Roped(NamedTuple):
     ) -> "Roped":
         """Not yet measured, on so many unknowns."""
         pulleys, spans, count = len(ropes.behind), ropes.spans, len(table.starts)
-        most = factors_needed(table, np.ones(pulleys))
+        most = call("factors_needed", table, np.ones(pulleys))
         return cls(
             table, ropes.behind, Drums.still(count), Spans.empty(ropes),
             Seen.empty(pulleys), np.zeros(pulleys), np.ones(count), np.zeros((most, spans)),

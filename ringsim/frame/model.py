@@ -22,8 +22,6 @@ from ringsim.frame.state import (
     Pose,
     State,
     Strains,
-    add_forces,
-    move,
     room_for_loads,
 )
 from ringsim.layout.bodies import Array
@@ -329,12 +327,13 @@ class FrameModel:
         if any(rod.nodes for rod in self.layout.rods):
             points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
             still = np.zeros_like(points)
-            add_forces(self.mesh, pose, points, still, state.strains, self._kept, unloaded)
+            given = pose, points, still, state.strains, self._kept, unloaded
+            call("add_forces", self.mesh, *given)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)
-        move(self.mesh, ahead.pose, small * self.first[: self.mesh.unknowns])
-        move(self.mesh, behind.pose, -small * self.first[: self.mesh.unknowns])
+        call("move", self.mesh, ahead.pose, small * self.first[: self.mesh.unknowns])
+        call("move", self.mesh, behind.pose, -small * self.first[: self.mesh.unknowns])
         if self.with_hub:
             self.first[-3:] = self.first[self._string_spots].mean(axis=0)
             ahead.hub += small * self.first[-3:]

@@ -17,7 +17,7 @@ from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
 from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import Readings
 from ringsim.frame.springs import STIFFNESS
-from ringsim.frame.state import Coefficients, State, add_forces, move
+from ringsim.frame.state import Coefficients, State
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.points import points_of
 from ringsim.parts.laws import AngleLaw, AngleRecord, Reaction, two_sided
@@ -244,7 +244,7 @@ class Standing:
                 break
             change = -self._solve(self.unbalance()[:, None])[:, 0]
             change *= min(1.0, _FARTHEST / max(float(np.abs(change).max()), _FARTHEST))
-            move(model.mesh, self.state.pose, change[: model.mesh.unknowns])
+            call("move", model.mesh, self.state.pose, change[: model.mesh.unknowns])
             if model.with_hub:
                 self.state.hub += change[-3:]
         raise InputError(
@@ -460,7 +460,7 @@ class Standing:
         strains, angles = [], []
         for way in (by, -by):
             state = self.state.copy()
-            move(mesh, state.pose, way * vector[: mesh.unknowns])
+            call("move", mesh, state.pose, way * vector[: mesh.unknowns])
             strains.append(self._strained(state))
             angles.append(model.openings.read(state.pose.angle, state.rate.angles)[0])
         strain, angle = ((one - other) / (2.0 * by) for one, other in (strains, angles))
@@ -475,8 +475,8 @@ class Standing:
         model, mesh = self.model, self.model.mesh
         call("place_points", mesh, state.pose, state.place.points)
         room, still = np.zeros_like(model.system.kept), np.zeros_like(state.place.points)
-        g = np.zeros(mesh.unknowns)
-        add_forces(mesh, state.pose, state.place.points, still, state.strains, room, g)
+        given = state.place.points, still, state.strains, room, np.zeros(mesh.unknowns)
+        call("add_forces", mesh, state.pose, *given)
         return state.strains.now
 
     def _in_joints(self, turned: Array) -> float:

@@ -72,30 +72,9 @@ class Strains(NamedTuple):
         return cls(np.zeros((elements, 6)), np.zeros((elements, 6)), np.zeros(1))
 
 
-def move(mesh: Mesh, pose: Pose, step: Array) -> None:
-    """Move a pose by changes of all unknowns, shape (unknowns,); in place."""
-    call("move", mesh, pose, step)
-
-
-def place_points(mesh: Mesh, pose: Pose, out: Array) -> None:
-    """Places of all points with mass, shape (p, 3)."""
-    call("place_points", mesh, pose, out)
-
-
 def room_for_loads(mesh: Mesh) -> Array:
     """Room for what elements hold, from ``add_forces`` to its derivative."""
     return np.zeros(call("room_for_loads", len(mesh.length)))
-
-
-def add_forces(
-    mesh: Mesh, pose: Pose, points: Array, accelerations: Array, strains: Strains, loads: Array,
-    g: Array,
-) -> None:  # fmt: skip
-    """Add forces of elastic rods and of inertia on all unknowns, shape (unknowns,); keeps what the
-    elements hold in ``loads`` (``room_for_loads``).  Places and accelerations are those of all
-    points, (p, 3).
-    """
-    call("add_forces", mesh, pose, points, accelerations, strains, loads, g)
 
 
 # Generalised-alpha on points and angles: rates and accelerations follow from places.

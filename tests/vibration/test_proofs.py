@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from beams import squares
+from ringsim.core.library import call
 from ringsim.exudyn.build import build
 from ringsim.frame.modes import PARTS, Standing
-from ringsim.frame.state import move
 from ringsim.layout.layout import layout_of
 from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, load_scene
@@ -147,7 +147,8 @@ def rayleigh(standing: Standing, vector: Any) -> float:
     forces = []
     for way in (by, -by):
         standing.state.recall(start.memory())
-        move(standing.model.mesh, standing.state.pose, way * vector[: standing.model.mesh.unknowns])
+        mesh = standing.model.mesh
+        call("move", mesh, standing.state.pose, way * vector[: mesh.unknowns])
         standing.state.hub += way * vector[-3:] if standing.model.with_hub else 0.0
         forces.append(standing.unbalance().copy())
     standing.state.recall(start.memory())

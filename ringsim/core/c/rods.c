@@ -112,8 +112,8 @@ static void carry(Load *own, Vec4 force, Vec4 moment) {
                    times4(e, cross4(own->w, turn4(&own->middle, psi))));
 }
 
-/* Add forces of elastic rods and of inertia on all unknowns; keeps strains, and what elements hold.
-   Places and accelerations are those of all points. */
+/* Add forces of elastic rods and of inertia on all unknowns; keeps strains, and what elements hold in
+   loads (room_for_loads).  Places and accelerations are those of all points, (p, 3). */
 void add_forces(const Mesh *mesh, const Pose *pose, const D *points, I n_points,
                 const D *accelerations, I n_accelerations, const Strains *strains, D *loads,
                 I n_loads, D *g, I n_g) {
@@ -362,6 +362,7 @@ void begin_tangent(const Mesh *mesh, const Pose *pose, const D *points, I n_poin
 
 /* Poses: how they move. */
 
+/* Places of all points with mass, (p, 3). */
 void place_points(const Mesh *mesh, const Pose *pose, D *out, I n_out) {
     (void)n_out;
     for (I n = 0; n < mesh->point_frame.n; n++) {
@@ -372,7 +373,7 @@ void place_points(const Mesh *mesh, const Pose *pose, D *out, I n_out) {
     }
 }
 
-/* Move a pose by changes of all unknowns. */
+/* Move a pose by changes of all unknowns, in place. */
 void move(const Mesh *mesh, const Pose *pose, const D *step, I n_step) {
     (void)n_step;
     for (I f = 0; f < pose->place.n; f++) {

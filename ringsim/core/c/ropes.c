@@ -244,7 +244,7 @@ static bool turns(const Ropes *ropes, const D *slopes, I span) {
     return ropes->pulley.at[span] >= 0 && slopes[ropes->pulley.at[span]] != 0.0;
 }
 
-/* Number of factors that tension_changes finds. */
+/* Number of factors that tension_changes finds with these slopes (s/m). */
 I factors_needed(const Ropes *ropes, const D *slopes, I pulleys) {
     (void)pulleys;
     I count = 0;
@@ -331,9 +331,17 @@ static void by_angle(const Rope *rope, D slope, D tail, I first, I b, const Span
     add_vector(longer + 3 * (b - first), times(-tail / rope->path, back));
 }
 
-/* Changes of tension in factors: tensions of the spans, shape (k, spans), and what they change with,
-   after the differences of the points, (k, spans, 3); both zeros before.  See
-   ringsim.core.tension.tension_changes. */
+/* Changes of tension in k factors: tensions of the spans (N), shape (k, spans), and what they change
+   with, after the differences of the points, (k, spans, 3); both zeros before.
+
+   Derivatives after places are taken by_place times, those after rates by_rate times.  The first
+   factor of a rope is that of its mean tension, with the share left of its stiffness that its winches
+   do not answer.  log_slopes are the derivatives of log_decays after the angles, 1/rad, slopes those
+   of the exponents after the rope's speed, s/m.
+
+   A pulley's friction changes all spans behind it, less their share of the path.  Pulleys between
+   which no span is felt change the same ones, and have one factor; their shares of the path go to the
+   last factor of the rope. */
 void tension_changes(const Ropes *ropes, const Drums *drums, const D *log_decays, I n_decays,
                      const D *log_slopes, I n_log_slopes, const D *slopes, I n_slopes,
                      const Spans *spans, const D *velocities, I n_velocities, const D *left, I n_left,
