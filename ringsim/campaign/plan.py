@@ -19,8 +19,9 @@ from ringsim.analysis.design import placement_of
 from ringsim.analysis.intervals import samples_needed
 from ringsim.analysis.requirements import Requirement, doubt_of
 from ringsim.campaign.folder import Folder, digests, opened_as, other_build
+from ringsim.campaign.merging import is_behind
 from ringsim.campaign.run import Order, grown, growth_told
-from ringsim.campaign.stopping import End, decided, is_behind, looks_of
+from ringsim.campaign.watch import End, decided, looks_of
 from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
 from ringsim.execution.work import Array, Work, relative_cost
