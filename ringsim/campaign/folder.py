@@ -1,4 +1,4 @@
-"""A campaign's folder: its design, its identity, whether it may be gone on with; its merging."""
+"""A campaign's folder: its design, its identity, whether it may be gone on with."""
 
 import contextlib
 import functools
