@@ -3,7 +3,6 @@ steps.
 """
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import exudyn as exu
@@ -23,7 +22,7 @@ from ringsim.outputs.meters import Reading
 from ringsim.outputs.recorder import Recorder
 from ringsim.rigid.statics import RopeReach, residual_tolerance, scales_of
 from ringsim.scene import Scene
-from ringsim.stepping.instant import Instant, Strained
+from ringsim.stepping.instant import Instant, Strained, Watch
 from ringsim.stepping.run import Run
 from ringsim.variables import Cause, Outcome, Reason
 
@@ -137,10 +136,6 @@ def newton_norm(built: Built) -> float:
 
 _REFUSE = 10.0
 """Error that makes exudyn repeat a step; its tolerance is 1."""
-
-
-Watch = Callable[[Instant], None]
-"""What is shown every accepted state of a run."""
 
 
 def solve(scene: Scene, watch: Watch | None = None) -> Outcome:

@@ -1,7 +1,7 @@
 """Time integration of a scene in joint coordinates; ``ringsim.stepping`` decides on the steps."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, cast
 
@@ -24,7 +24,7 @@ from ringsim.refusal import InputError
 from ringsim.rigid.statics import scales_of
 from ringsim.scene import Scene
 from ringsim.stepping.control import go_on
-from ringsim.stepping.instant import Instant, Memory, Strained
+from ringsim.stepping.instant import Instant, Memory, Strained, Watch
 from ringsim.stepping.run import Run
 from ringsim.variables import Outcome
 
@@ -32,13 +32,8 @@ _EASY, _PATIENCE = 3, 4
 """Newton iterations up to which a step was easy, and steps after which, if they are not, the other
 polynomial is tried that may foretell the motion: a cubic where it is smooth, as at the speed of a
 flight, a parabola where ropes swing within a step."""
-_MOST = 25
-"""Iterations that count for a step that failed: as many as there are at most."""
 _SHORTEST = 1e-9
 """Step (s) below which Newton's failure ends a run, as of the full model."""
-
-Watch = Callable[[Instant], None]
-"""What is shown every accepted state of a run."""
 
 
 def solve(scene: Scene, watch: Watch | None = None) -> Outcome:
@@ -150,7 +145,8 @@ class Integration(Run):
         found = self.model.balance(time, step, self._now, after)
         self.history.newton_iterations += found.iterations
         self.history.jacobians += found.tangents
-        self._choose(_MOST if found.why else found.iterations)
+        # A step that failed counts as one that took all iterations there are.
+        self._choose(call("most_iterations") if found.why else found.iterations)
         if found.why:
             raise NoBalanceError(found.why)
 

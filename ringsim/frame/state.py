@@ -105,6 +105,9 @@ class Coefficients(NamedTuple):
         gamma = 0.5 - alpha_m + alpha_f
         return cls(alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma)
 
+    # ``stiffen`` of newton.c has both as well; tests/frame/test_frame_tangent.py compares tangents
+    # with differences, with parts of either.
+
     def acceleration_by_place(self, step: float) -> float:
         """Derivative of a_1 after z_1, 1/s^2."""
         return (1.0 - self.alpha_m) / ((1.0 - self.alpha_f) * self.beta * step**2)

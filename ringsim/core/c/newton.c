@@ -83,6 +83,7 @@ I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, con
     const Coefficients *with = &system->with;
     const I *cuts = system->held.cuts.at;
     const D *rates = now->followed.rate.at;
+    /* As Coefficients in ringsim.frame.state, which tells parts of Python's the same. */
     D by_rate = with->gamma / (with->beta * step);
     D by_place = (1.0 - with->alpha_m) / ((1.0 - with->alpha_f) * with->beta * step * step);
     I strung = border->used.at[STRUNG], factors = 0;

@@ -98,7 +98,8 @@ static D force_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
     return stretch * material[0];
 }
 
-/* Tension of a force, slack within a width, without compression. */
+/* Tension of a force, slack within a width, without compression; ringsim.cable.winches has the same
+   where winches answer to it. */
 static D smooth(D force, D width) {
     return larger(force, 0.0) + width * log1p(exp(larger(-fabs(force) / width, -200.0)));
 }
