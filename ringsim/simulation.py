@@ -117,9 +117,9 @@ def why_not_frame(scene: Scene) -> str:
     try:
         _refuse_other_rods(scene)
         from ringsim.frame.model import FrameModel
-        from ringsim.frame.readings import Readings
+        from ringsim.frame.readings import FrameMeters
 
-        Readings(FrameModel(scene))
+        FrameMeters(FrameModel(scene))
     except InputError as error:
         return str(error)
     return ""

@@ -238,7 +238,7 @@ def indices_with_intervals(
 
 LEAST_SAMPLES = 40
 """Samples below which no index is given."""
-PARTS = 20
+JACKKNIFE_PARTS = 20
 """Parts of independent samples, each of which the jackknife leaves out once."""
 _NO_LINE = 1e-12
 """Scatter of places in a bin, as a sum of squares, from which on no line is fitted there."""

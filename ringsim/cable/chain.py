@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ringsim.cable.friction import LEAST_TENSION, Friction, Pulleys
-from ringsim.cable.ropes import PARTS, Array, Flags, Ropes
+from ringsim.cable.ropes import CHAIN_PARTS, Array, Flags, Ropes
 from ringsim.cable.winding import WinchReading
 
 # The chain at one instant: tensions, forces, powers.
@@ -19,12 +19,12 @@ begins as long as its path is off by 1e-15, as lengths of points in another orde
 
 
 class _Part:
-    """What one of ``PARTS`` is at an instant, shape (spans,), (pulleys,), (ropes,) or (cables, 2);
-    of many instants at once these are the first axis.
+    """What one of ``CHAIN_PARTS`` is at an instant, shape (spans,), (pulleys,), (ropes,) or
+    (cables, 2); of many instants at once these are the first axis.
     """
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self._name, self._each = name, PARTS[name][1]
+        self._name, self._each = name, CHAIN_PARTS[name][1]
 
     def __get__(self, state: "ChainState", owner: type) -> Array:
         found = state.numbers[..., state.ropes.places[self._name]]

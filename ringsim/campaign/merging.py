@@ -24,7 +24,7 @@ from ringsim.sampling.columns import Table, add_inputs
 from ringsim.scene import Scene
 from ringsim.storage import netcdf
 from ringsim.storage.journal import FOLDER, DamagedError, Survey
-from ringsim.storage.netcdf import GO_ON, PER_SAMPLE, OutputTable, locked, provenance
+from ringsim.storage.netcdf import GO_ON, PER_SAMPLE, OutputTable, attributes_of_file, locked
 from ringsim.storage.result import sample_of, stacked
 from ringsim.variables import Cause, Fidelity, Status, Variable
 
@@ -46,9 +46,9 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
     InputError if the folder cannot be written to, or no sample at all has run.
     """
     path, design = campaign.path / MERGED, campaign.attributes
-    model = Fidelity[design.get("fidelity", "full").upper()]
-    title, planned = design["title"], campaign.table.samples
-    made = provenance(name=design["campaign_name"], title=title, action="merged", model=model)
+    model, planned = Fidelity[design.get("fidelity", "full").upper()], campaign.table.samples
+    name, title = design["campaign_name"], design["title"]
+    made = attributes_of_file(name=name, title=title, action="merged", model=model)
     attributes = made | {n: design[n] for n in _KEPT if n in design} | {"execution": execution}
     attributes["history"] += f"\n{design['history']}"
     output = OutputTable.model_validate_json(design["output"])

@@ -14,7 +14,7 @@ from ringsim.exudyn.build import Built, build
 from ringsim.exudyn.laws import AngleForces
 from ringsim.exudyn.meters import (
     EnergyMeter,
-    Readings,
+    FullMeters,
 )
 from ringsim.exudyn.model import Openings, State, joint_groups
 from ringsim.layout.layout import Layout
@@ -161,7 +161,7 @@ class Integration(Run):
         self._now = State(model)
         self._openings = Openings(model)
         self._energy = EnergyMeter(built)
-        self._readings = Readings(built, self._now)
+        self._readings = FullMeters(built, self._now)
         self._gaps = joint_groups(model)
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None

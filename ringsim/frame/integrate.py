@@ -12,7 +12,7 @@ from ringsim.cable.ropes import CableFault, Ropes
 from ringsim.core.library import call
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
-from ringsim.frame.readings import EnergyMeter, Readings
+from ringsim.frame.readings import EnergyMeter, FrameMeters
 from ringsim.frame.state import State
 from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Array
@@ -65,7 +65,7 @@ class Integration(Run):
         self._moves: list[tuple[float, Array]] = []
         self._taken, self._cubic, self._tried = [0, 0], True, 0
         self._steps: list[tuple[float, Array]] = []
-        self._readings = Readings(model)
+        self._readings = FrameMeters(model)
         self.history = Recorder(scene, self._readings.coordinates())
         ropes = None if model.cables is None else model.cables.ropes.content
         first = self._measure(0.0, self._now)
@@ -192,7 +192,7 @@ class Integration(Run):
         """A state, with its cables, and what has passed since the one that was kept last."""
         cables = self.model.cables
         if cables is not None:
-            state.chain = cables.state(time, state.place.lines, state.rate.lines)
+            state.chain = cables.state(time, state.place.paths, state.rate.paths)
         return self._known(time, state)
 
     def _known(self, time: float, state: State) -> Instant:
@@ -354,7 +354,7 @@ class Storing(Integration):
         wound, rate = memory["wound"]
         before = [cable for _, cable in scene.cables.present()]
         cables.winches.go_on(memory["winches"], before, start.time, wound, rate)
-        place, moving = self._now.place.lines, self._now.rate.lines
+        place, moving = self._now.place.paths, self._now.rate.paths
         return cables.go_on(own.ropes, place, moving, wound, rate)
 
 

@@ -15,7 +15,7 @@ from ringsim.frame.cables import FrameCables, Roped
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
 from ringsim.frame.model import FrameModel
-from ringsim.frame.readings import Readings
+from ringsim.frame.readings import FrameMeters
 from ringsim.frame.springs import STIFFNESS
 from ringsim.frame.state import Coefficients, State
 from ringsim.layout.bodies import Array, skew
@@ -39,7 +39,7 @@ from ringsim.scene.substituted import strained, substituted
 # in Mathematical Software III, 1977); a block finds modes of one frequency together, as rings have.
 
 
-PARTS = (
+ENERGY_PARTS = (
     "bending of rods",
     "stretch and twist of rods",
     "V-joints",
@@ -101,8 +101,8 @@ class Modes(NamedTuple):
     """What a structure does by itself about a state: n modes in the order of their w^2, (n,),
     rad^2/s^2, negative where it leaves that state; p points with their ``names`` and places, (p,
     3), m; shapes, (n, p, 3), whose largest way is 1, and their masses, (n,), kg; shares of
-    ``PARTS`` in their energy, (n, parts); effective masses along the axes, (n, 3), kg, none of
-    what floats free.
+    ``ENERGY_PARTS`` in their energy, (n, parts); effective masses along the axes, (n, 3), kg, none
+    of what floats free.
 
     ``rigid`` and ``mechanism`` are motions that nothing holds: of the whole, and of its parts.
     """
@@ -257,7 +257,7 @@ class Standing:
         """Wind ropes until each has a tension, N: secants, as the structure gives."""
         content, last = cables.ropes.content, None
         for _ in range(_PATIENCE):
-            chain = cables.state(0.0, self.state.place.lines, self.state.rate.lines)
+            chain = cables.state(0.0, self.state.place.paths, self.state.rate.paths)
             # By the force before slack, which goes straight where the tension bends.
             width = chain.material[2]
             off = chain.forces - tension - width * np.log1p(-np.exp(-tension / width))
@@ -435,7 +435,7 @@ class Standing:
     def _told(self, squares: Array, vectors: Array, rigid: int, mechanism: int) -> Modes:
         """Modes of w^2 and their vectors, in columns."""
         model = self.model
-        readings, state = Readings(model), self.state.copy()
+        readings, state = FrameMeters(model), self.state.copy()
         shapes, shares = [], []
         for square, vector in zip(squares, vectors.T, strict=True):
             state.rate.points[...] = (self.moving @ vector).reshape(-1, 3)
@@ -452,8 +452,8 @@ class Standing:
         )  # fmt: skip
 
     def stored(self, vector: Array) -> list[float]:
-        """Energy of a change of the unknowns in ``PARTS`` but the last, J: from the strains that it
-        makes, and not from the tangent.
+        """Energy of a change of the unknowns in ``ENERGY_PARTS`` but the last, J: from the strains
+        that it makes, and not from the tangent.
         """
         model, mesh = self.model, self.model.mesh
         by = _NUDGE / float(np.abs(self.moving @ vector).max())

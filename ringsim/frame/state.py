@@ -169,7 +169,7 @@ class Groups(NamedTuple):
     """
 
     points: Array
-    lines: Array
+    paths: Array
     angles: Array
     ends: Array
     hub: Array
@@ -178,11 +178,11 @@ class Groups(NamedTuple):
     @classmethod
     def of(cls, values: Array, held: Held) -> "Groups":
         """Views of followed coordinates."""
-        points, lines, angles, *rest = [
+        points, paths, angles, *rest = [
             values[first:last] for first, last in pairwise(held.cuts.tolist())
         ]
         ends, hub, hung = (each.reshape(-1, 3) for each in rest)
-        return cls(points.reshape(-1, 3), lines.reshape(-1, 3), angles, ends, hub, hung)
+        return cls(points.reshape(-1, 3), paths.reshape(-1, 3), angles, ends, hub, hung)
 
 
 class Moving(NamedTuple):

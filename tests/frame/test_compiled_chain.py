@@ -78,9 +78,9 @@ def test_accepted_states_are_those_of_the_chain(faults: bool) -> None:
     time = run.run().times[-1]
     cables, state = run.model.cables, run.state
     assert cables is not None
-    found = cables.state(time, state.place.lines, state.rate.lines)
+    found = cables.state(time, state.place.paths, state.rate.paths)
     wound = found.wound, found.wound_rate
-    truth = cables.chain.state(cables.ropes, state.place.lines, state.rate.lines, *wound)
+    truth = cables.chain.state(cables.ropes, state.place.paths, state.rate.paths, *wound)
     assert found.tensions.max() > 1.0
     assert found.ropes.alive.tolist() == ([True, True, False] if faults else [True, True])
     for field in fields(ChainState):

@@ -413,7 +413,7 @@ void straighten(const Pose *pose) {
 /* A step: how it begins from a state, and what it has led to. */
 
 /* Begin at the start, moved by changes of all unknowns, the hub's last. */
-void set_out(const Mesh *mesh, const State *start, const State *now, const D *by, I n_by) {
+void set_out(const Mesh *mesh, const Moving *start, const Moving *now, const D *by, I n_by) {
     const Pose *from = &start->pose, *pose = &now->pose;
     memcpy(pose->place.at, from->place.at, (size_t)(3 * pose->place.n) * sizeof(D));
     memcpy(pose->axes.at, from->axes.at, (size_t)(9 * pose->axes.n) * sizeof(D));
@@ -424,7 +424,7 @@ void set_out(const Mesh *mesh, const State *start, const State *now, const D *by
 }
 
 /* Straighten the axes that a step has led to; changes of all unknowns over it, before that. */
-void arrive(const Mesh *mesh, const State *start, const State *now, D *out, I n_out) {
+void arrive(const Mesh *mesh, const Moving *start, const Moving *now, D *out, I n_out) {
     moved_between(mesh, &start->pose, &now->pose, out);
     for (I k = mesh->unknowns; k < n_out; k++) {
         I own = k - mesh->unknowns;
