@@ -93,7 +93,7 @@ class CommandedWinding(PrescribedWinding):
 
     @property
     def told_before(self) -> bool:
-        """Whether it has the fields that a run writes, which no scene may give."""
+        """See ``Winding``."""
         return bool(self.begun or self.from_speed or self.wound_before)
 
     def commanded_speed(self) -> float:

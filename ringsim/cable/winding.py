@@ -64,6 +64,11 @@ class Winding(Model):
         """The motor with its gears, of a law that has one."""
         return None
 
+    @property
+    def told_before(self) -> bool:
+        """Whether it has what only a run writes, which no scene may give."""
+        return False
+
     def usual_speed(self) -> float:
         """Speed of the winch for most of its time, m/s, as far as known beforehand; never negative.
 
