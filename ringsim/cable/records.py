@@ -266,7 +266,7 @@ class Cables(Model):
 # Names of the points of a cable's path and of its spans, in inputs, outputs and messages.
 
 
-CABLES = tuple(Cables.model_fields)
+CABLES = ("upper", "lower")
 OF_SECTION = ("first hinge", "V", "second hinge")
 """Pulleys of a section; its first hinge assembly is the one next to the section before."""
 
