@@ -32,10 +32,11 @@ class DenseDrive:
         drive: CableDrive, mbs: Any, t: float, number: int, q: Any, q_t: Any, f: float, g: float
     ) -> Any:
         state, placed = drive._answer(q, q_t, t)
-        drive.pattern.steady, drive.pattern.negligible = np.inf, 0.0
-        entries = drive.pattern.triplets(state, placed, f, g, state.exponent_slopes)
+        drive.pattern.passing, drive.pattern.negligible = 0.0, 0.0
+        slopes = state.exponent_slopes
+        entries = drive.pattern.triplets(drive.chain, state, placed, f, g, slopes)
         own = drive.path.size
-        size = own + drive.auxiliary
+        size = own + drive.pattern.unknowns
         whole = np.zeros((size, size))
         np.add.at(whole, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])
         inner = whole[:own, :own] - whole[:own, own:] @ np.linalg.solve(

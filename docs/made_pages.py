@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 
 import ringsim
-from ringsim.cable.records import path_of, points_of, spans_of
+from ringsim.cable.records import path_of, points_along, spans_of
 from ringsim.cli import VERBS, command_of
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
@@ -93,7 +93,7 @@ def places_of_cables() -> str:
         "last": "one winch at the last section",
         "both": "a winch at either end",
     }.items():
-        path = path_of(points_of(2), end)
+        path = path_of(points_along(2), end)
         pulleys, spans = path[1:-1], spans_of(path)
         rows = [
             (str(k), name, pulleys[k - 1] if k <= len(pulleys) else "")

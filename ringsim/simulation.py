@@ -28,7 +28,7 @@ from ringsim.rigid.margin import with_margin
 from ringsim.scene import Scene, load_scene
 from ringsim.scene.substituted import substituted
 from ringsim.stepping.ending import run_with_restarts
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Watch
 from ringsim.stored_state import require_fit
 from ringsim.threads import one_thread
 from ringsim.variables import GONE, Cause, Fate, Fidelity, Outcome, Status
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FIDELITIES", "Steps", "run", "run_frame", "simulate", "steps", "why_not_frame"]
 
-Watch = Callable[[Instant], None]
-"""What is shown every accepted state of a run."""
 Solve = Callable[[Scene, Watch | None], Outcome]
 """An engine."""
 
@@ -119,9 +117,9 @@ def why_not_frame(scene: Scene) -> str:
     try:
         _refuse_other_rods(scene)
         from ringsim.frame.model import FrameModel
-        from ringsim.frame.readings import Readings
+        from ringsim.frame.readings import FrameMeters
 
-        Readings(FrameModel(scene))
+        FrameMeters(FrameModel(scene))
     except InputError as error:
         return str(error)
     return ""
@@ -129,10 +127,10 @@ def why_not_frame(scene: Scene) -> str:
 
 def _refuse_other_rods(scene: Scene) -> None:
     """The frame engine's elements are geometrically exact, whatever a scene asks for."""
-    if (kind := kind_of(scene.rods)) != "geometrically-exact":
+    if not scene.rods.oriented:
         raise InputError(
-            f'rods.kind = "{kind}": fidelity = "frame" has geometrically-exact rods only: leave '
-            'rods.kind out, or choose fidelity = "full"'
+            f'rods.kind = "{kind_of(scene.rods)}": fidelity = "frame" has geometrically-exact rods '
+            'only: leave rods.kind out, or choose fidelity = "full"'
         )
 
 

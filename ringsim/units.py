@@ -221,6 +221,8 @@ PerSection = Annotated[
     ListIn,
 ]
 """One value for all sections, or a list (TOML array) with one value for each."""
+PerPulley = PerSection[_T]
+"""The same of the pulleys of a cable, in order from its winch."""
 
 
 def at_section(record: _Record, where: int | NDArray[np.int64]) -> _Record:

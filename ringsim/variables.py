@@ -16,6 +16,10 @@ TIMINGS = ("wall_time", "cpu_time")
 """The only variables that differ between repetitions of one run."""
 
 
+NO_CODE = -1
+"""What files hold where a code is missing: ``status`` and others of samples that have not run."""
+
+
 class Code(IntEnum):
     """A number in files that stands for a word."""
 

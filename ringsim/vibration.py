@@ -11,7 +11,7 @@ import xarray as xr
 
 from ringsim import build
 from ringsim.choice import kind_of
-from ringsim.frame.modes import PARTS, Modes, Standing
+from ringsim.frame.modes import ENERGY_PARTS, Modes, Standing
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.structures.pantograph_ring import LEAST_OPENING
@@ -21,7 +21,7 @@ from ringsim.threads import one_thread
 DEPLOYED = 180.0
 _WORDS = ("stowed", "deployed")
 _MOST_ANGLES, _MOST_MODES = 200, 100
-_LETTERS = dict(zip(PARTS, ("b", "s", "v", "m", "n"), strict=True))
+_LETTERS = dict(zip(ENERGY_PARTS, ("b", "s", "v", "m", "n"), strict=True))
 
 
 @one_thread()
@@ -166,7 +166,7 @@ def _dataset(
     words = {
         "angle": (angles, "degree", "opening angle of all V-joints"),
         "mode": (np.arange(1, squares.shape[1] + 1), "1", "number of a mode, from the lowest"),
-        "part": (list(PARTS), "", "what stores the energy of a shape"),
+        "part": (list(ENERGY_PARTS), "", "what stores the energy of a shape"),
         "point": (list(found[0].names), "", "point of the structure"),
         "axis": (["x", "y", "z"], "", "axis of space"),
     }
@@ -209,7 +209,8 @@ def modes_tables(found: xr.Dataset) -> list[Table]:
         rows.append([f"{angle:.4g}", joints, *counts, *cells])
     head = ["opening (deg)", "V-joints", "rigid", "mechanism"]
     head += [f"mode {k}" for k in found["mode"].values]
-    used = sorted({str(found["part"].values[k]) for k in share.ravel()}, key=list(PARTS).index)
+    parts = {str(found["part"].values[k]) for k in share.ravel()}
+    used = sorted(parts, key=list(ENERGY_PARTS).index)
     notes = ["most energy in: " + ", ".join(f"{_LETTERS[part]} {part}" for part in used)]
     notes += list(_free(found)) + list(_unstable(found))
     title = "Natural frequencies (Hz), and motions that nothing holds:"

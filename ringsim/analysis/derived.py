@@ -186,8 +186,11 @@ def over_samples(
     axes: Mapping[str, NDArray[Any]],
 ) -> dict[str, NDArray[np.float64]]:  # fmt: skip
     """Values of all outputs, shape (samples,), from arrays of stored variables whose first axis are
-    samples; NaN where a run lacks what they need.
+    samples; NaN where a run lacks what they need, and none where nothing is stored.
     """
+    arrays = {name: values for name, values in arrays.items() if name in VARIABLES}
+    if not (outputs and arrays):
+        return {}
     import xarray as xr  # here, since it takes most of a second
 
     known: dict[str, xr.DataArray] = {}
@@ -199,7 +202,7 @@ def over_samples(
             if VARIABLES[name].dtype.startswith("i"):  # missing counts are negative
                 values = np.where(values < 0.0, np.nan, values)
             known[name] = xr.DataArray(values, dims=dims, coords=coordinates)
-    count = len(next(iter(arrays.values()))) if arrays else 0
+    count = len(next(iter(arrays.values())))
     found = {}
     for name, each in outputs.items():
         values = np.full(count, np.nan)

@@ -27,7 +27,7 @@ from ringsim.sampling.columns import BLOCK_ROW
 from ringsim.sampling.designs.blocks import Grouped, stretches
 from ringsim.sampling.designs.family import Design
 from ringsim.stepping.instant import Array
-from ringsim.variables import GOALS, Cause, Code, Fate, Status
+from ringsim.variables import GOALS, NO_CODE, Cause, Code, Fate, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -501,7 +501,6 @@ def place_names(variable: xr.DataArray) -> list[str]:
 # Opening what ringsim has stored: campaigns and runs, by folder or by file.
 
 
-_NOT_RUN = -1
 _MOST_ENTRIES = 10**9
 """Of a dimension: a file may claim to have more, and memory would be asked for all of them."""
 
@@ -514,7 +513,7 @@ def _require_codes(found: xr.Dataset, file: Path) -> None:
         if name not in found or found[name].dtype.kind not in "iuf":
             continue
         values = found[name].to_numpy().ravel()
-        known = [_NOT_RUN, *(int(each) for each in kind)]
+        known = [NO_CODE, *(int(each) for each in kind)]
         wrong = values[np.isfinite(values) & ~np.isin(values, known)]
         if len(wrong):
             found.close()

@@ -238,13 +238,12 @@ def indices_with_intervals(
 
 LEAST_SAMPLES = 40
 """Samples below which no index is given."""
-PARTS = 20
+JACKKNIFE_PARTS = 20
 """Parts of independent samples, each of which the jackknife leaves out once."""
 _NO_LINE = 1e-12
 """Scatter of places in a bin, as a sum of squares, from which on no line is fitted there."""
 _FEW_VALUES = 12
 """Different values of a column up to which each is a bin of its own."""
-_LEVEL = 0.95
 _SHUFFLES = 199
 _NUMBERS = 4_000_000
 """Numbers that all shuffles of an output may take, about."""
@@ -366,7 +365,7 @@ def chance_levels(columns: Sequence[Bins], outputs: Array) -> Array:
         scaled = scatter[some] / np.sqrt(square[some, None])
         shuffled = np.hstack([each[shuffles] for each in scaled])
         largest = np.fmax.reduce([given_data_indices(bins, shuffled) for bins in columns])
-        found[some] = np.quantile(largest.reshape(-1, count), _LEVEL, axis=1)
+        found[some] = np.quantile(largest.reshape(-1, count), LEVEL, axis=1)
     return found
 
 

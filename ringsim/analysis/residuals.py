@@ -73,8 +73,8 @@ def residuals(run: xr.Dataset, measurement: Measurement) -> list[Residuals]:
 
 _TAIL = 0.05
 """Share of samples on each side of a band."""
-_WIDE = 1.6449
-"""Sigmas of a reading on each side that hold as much."""
+BAND = 1.6449
+"""Sigmas on each side of the middle that hold 90 % of a normal variable: ``_TAIL`` lies beyond."""
 _FAR = 3.5
 """Sigmas of a reading beyond every sample from which on scatter is not to blame: once in 4,000
 readings even at the last sample."""
@@ -91,8 +91,8 @@ def _of_samples(readings: Readings, values: Array) -> Residuals:
     # A sensor's own bias moves all its readings, and so each of them.
     sigma = math.hypot(readings.deviation, readings.bias_deviation)
     band = np.array([
-        middle - np.hypot(middle - low, _WIDE * sigma),
-        middle + np.hypot(high - middle, _WIDE * sigma),
+        middle - np.hypot(middle - low, BAND * sigma),
+        middle + np.hypot(high - middle, BAND * sigma),
     ])  # fmt: skip
     past = np.maximum(np.nanmin(known, axis=0) - measured, measured - np.nanmax(known, axis=0))
     return Residuals(

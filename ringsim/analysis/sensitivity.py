@@ -229,7 +229,7 @@ def _given(
     do not scatter as the correction for chance takes it.
     """
     replicate = placed.replicate_of(index)
-    part = index % indices.PARTS if replicate is None else replicate
+    part = index % indices.JACKKNIFE_PARTS if replicate is None else replicate
     part = np.unique(part, return_inverse=True)[1]
     certain = placed.has_intervals and placed.kind != "sobol" and part.max() > 0
     bins = [indices.Bins(column) for column in columns.T]

@@ -1,5 +1,5 @@
-"""Cables over pulleys: friction, tension chain, tangents, winches and faults; numpy only.
+"""Cables over pulleys: records, laws of friction and winding, winches, controllers, ropes, faults.
 
-Independent of bodies and joints: the input are positions and velocities of the pulleys, the
-output is the force on each of them.
+Independent of bodies and joints.  How a rope's tensions follow from the motion of its pulleys is
+computed in ``ringsim.core``; ``ringsim.cable.chain`` is what that tells of an instant.
 """

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ringsim.cable.friction import LEAST_TENSION, Friction, Pulleys
-from ringsim.cable.ropes import PARTS, Array, Flags, Ropes
+from ringsim.cable.ropes import CHAIN_PARTS, Array, Flags, Ropes
 from ringsim.cable.winding import WinchReading
 
 # The chain at one instant: tensions, forces, powers.
@@ -19,12 +19,12 @@ begins as long as its path is off by 1e-15, as lengths of points in another orde
 
 
 class _Part:
-    """What one of ``PARTS`` is at an instant, shape (spans,), (pulleys,), (ropes,) or (cables, 2);
-    of many instants at once these are the first axis.
+    """What one of ``CHAIN_PARTS`` is at an instant, shape (spans,), (pulleys,), (ropes,) or
+    (cables, 2); of many instants at once these are the first axis.
     """
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self._name, self._each = name, PARTS[name][1]
+        self._name, self._each = name, CHAIN_PARTS[name][1]
 
     def __get__(self, state: "ChainState", owner: type) -> Array:
         found = state.numbers[..., state.ropes.places[self._name]]
@@ -129,29 +129,9 @@ class ChainState:
         return np.asarray(self.lengths * (1.0 - taut[rope] * self.shares - loose[rope]))
 
     @property
-    def friction_loss(self) -> Array:
-        """Power lost on each pulley, in W, never negative, shape (pulleys,)."""
-        return self.friction_forces * self.speeds
-
-    @property
-    def damping_loss(self) -> Array:
-        """Power lost inside each rope, in W, never negative, shape (ropes,)."""
-        return np.asarray(self.viscous_forces * self.strain_rates * self.natural)
-
-    @property
     def elastic_energy(self) -> Array:
         """Elastic energy of each rope, in J, shape (ropes,)."""
         return self.energy_density * self.natural
-
-    @cached_property
-    def winch_forces(self) -> Array:
-        """Force of the winches at both ends of each cable per natural length, in N, (cables, 2)."""
-        return self.winch_tensions * (1.0 + self.strains[self.ropes.of_end])
-
-    @property
-    def winch_power(self) -> Array:
-        """Power that the winches at both ends of each cable put in, in W, shape (cables, 2)."""
-        return self.winch_forces * self.wound_rate
 
     def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
         """Readings of the winch at an end (0 first, 1 far) of a cable (from 0)."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, model_validator
 
+from ringsim.cable.ropes import Array
 from ringsim.cable.winding import FeedbackWinding, PrescribedWinding, WinchReading
 from ringsim.choice import kind_of
 from ringsim.parts.faults import AT_ONCE, LAST, SILENT
@@ -30,7 +30,6 @@ from ringsim.units import (
 if TYPE_CHECKING:
     from ringsim.scene import Scene
 
-Array = NDArray[np.float64]
 Place = tuple[int, int]
 """A winch: the number of its cable, and its end (0 first, 1 far)."""
 
@@ -94,7 +93,7 @@ class CommandedWinding(PrescribedWinding):
 
     @property
     def told_before(self) -> bool:
-        """Whether it has the fields that a run writes, which no scene may give."""
+        """See ``Winding``."""
         return bool(self.begun or self.from_speed or self.wound_before)
 
     def commanded_speed(self) -> float:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 
 from ringsim.cable.ropes import Array
-from ringsim.units import FrictionCoefficient, MetreOrZero, Model, PerSection
+from ringsim.units import FrictionCoefficient, MetreOrZero, Model, PerPulley
 
 # Slip speed that regularises pulley friction, and the error that it causes at low speed.
 #
@@ -213,7 +213,7 @@ UNSOLVED = (
 class Bearing(PulleyFriction):
     """Any law of a pulley's bearing with the friction moment f times the radial force."""
 
-    coefficient: PerSection[MetreOrZero]
+    coefficient: PerPulley[MetreOrZero]
     """f in metre: one value for all pulleys, or one for each in order from the winch."""
 
     def refusal(self, radius: float) -> str | None:
@@ -301,7 +301,7 @@ class CapstanFriction(PulleyFriction):
     """
 
     kind: Literal["capstan"] = "capstan"
-    coefficient: PerSection[FrictionCoefficient]
+    coefficient: PerPulley[FrictionCoefficient]
     """mu: one value for all sheaves, or one for each in order from the winch."""
 
     def log_decay(self, angle: Array, radius: float) -> Array:

@@ -271,10 +271,10 @@ OF_SECTION = ("first hinge", "V", "second hinge")
 """Pulleys of a section; its first hinge assembly is the one next to the section before."""
 
 
-def points_of(sections: int) -> tuple[str, ...]:
+def points_along(sections: int) -> tuple[str, ...]:
     """What a cable runs along, from section 1 on.
 
-    >>> points_of(1)
+    >>> points_along(1)
     ('section 1 first hinge', 'section 1 V', 'section 1 second hinge')
     """
     return tuple(f"section {k} {place}" for k in range(1, sections + 1) for place in OF_SECTION)
@@ -285,7 +285,7 @@ def path_of(points: Sequence[str], end: str) -> tuple[str, ...]:
 
     ``points`` are in the order of the sections, ``end`` is that of ``Cable``.
 
-    >>> path_of(points_of(1), "last")
+    >>> path_of(points_along(1), "last")
     ('winch', 'section 1 second hinge', 'section 1 V', 'section 1 first hinge')
     """
     path = points[::-1] if end == "last" else points
@@ -295,7 +295,7 @@ def path_of(points: Sequence[str], end: str) -> tuple[str, ...]:
 def spans_of(path: Sequence[str]) -> tuple[str, ...]:
     """Names of the spans by their ends; the section stands there once if both have the same.
 
-    >>> spans_of(path_of(points_of(1), "first"))[:2]
+    >>> spans_of(path_of(points_along(1), "first"))[:2]
     ('winch to section 1 first hinge', 'section 1 first hinge to V')
     """
     return tuple(f"{one} to {_short(one, other)}" for one, other in pairwise(path))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
-PARTS = {
+CHAIN_PARTS = {
     "lengths": ("span", 1), "rates": ("span", 1), "tensions": ("span", 1), "shares": ("span", 1),
     "directions": ("span", 3), "angles": ("pulley", 1), "speeds": ("pulley", 1),
     "exponents": ("pulley", 1), "log_decays": ("pulley", 1), "friction_forces": ("pulley", 1),
@@ -79,12 +79,12 @@ class Ropes:
 
     @cached_property
     def places(self) -> dict[str, slice]:
-        """Where each of ``PARTS`` stands in the row of all."""
+        """Where each of ``CHAIN_PARTS`` stands in the row of all."""
         cables, ropes = len(self.points_per_cable), len(self.starts)
         counts = {"span": self.spans, "pulley": len(self.behind), "rope": ropes, "cable": cables}
-        sizes = [counts[of] * each for of, each in PARTS.values()]
+        sizes = [counts[of] * each for of, each in CHAIN_PARTS.values()]
         cuts = itertools.pairwise(itertools.accumulate(sizes, initial=0))
-        return {name: slice(*own) for name, own in zip(PARTS, cuts, strict=True)}
+        return {name: slice(*own) for name, own in zip(CHAIN_PARTS, cuts, strict=True)}
 
     @cached_property
     def near(self) -> Indices:

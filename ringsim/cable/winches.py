@@ -159,7 +159,8 @@ class _Rope:
             left = natural - self.wound(elapsed, total)
             strain_rate = (rate + path / left * (total + rest)) / left
             force = stiffness * (path / left - 1.0 + damping_time * strain_rate)
-            # The rope law for one number: numpy takes ten times as long in the root finder.
+            # ``smooth`` of ropes.c for one number, which a call of the core would only delay; see
+            # tests/cable/test_winding_laws.py for both.
             mean = max(force, 0.0) + width * math.log1p(math.exp(-abs(force) / width))
             return [
                 min(max(law.command(mean * now.tension_ratio(total / count), now), least), most)

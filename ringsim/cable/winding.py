@@ -64,6 +64,11 @@ class Winding(Model):
         """The motor with its gears, of a law that has one."""
         return None
 
+    @property
+    def told_before(self) -> bool:
+        """Whether it has what only a run writes, which no scene may give."""
+        return False
+
     def usual_speed(self) -> float:
         """Speed of the winch for most of its time, m/s, as far as known beforehand; never negative.
 
@@ -238,10 +243,10 @@ class MotorWinding(FeedbackWinding):
                 f"torque_limit = {self.torque_limit} N m and current_limit = {self.current_limit} "
                 "A limit the same torque: leave one of them out"
             )
-        fastest = self.voltage * self.no_load_speed
-        if self.speed is not None and self.speed >= fastest:
+        if self.speed is not None and self.speed >= self.free_speed:
             raise ValueError(
-                f"speed = {self.speed} rad/s must be below voltage * no_load_speed = {fastest:g} "
+                f"speed = {self.speed} rad/s must be below voltage * no_load_speed = "
+                f"{self.free_speed:g} "
                 "rad/s: the motor has no torque at its speed (lower it, or raise the voltage)"
             )
         if self.ramp is not None and self.speed is None:
@@ -295,13 +300,19 @@ class MotorWinding(FeedbackWinding):
         if self.ramp is None:
             return self.fastest, 0.0
         phase = np.clip(time / self.ramp, 0.0, 1.0)
+        # The quintic step of ``RampWinding``, of many instants at once.
         share = phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
         return self.fastest * share, self.fastest * 30.0 * (phase * (1.0 - phase)) ** 2 / self.ramp
 
     @property
+    def free_speed(self) -> float:
+        """Speed of the shaft without a load at its voltage, rad/s."""
+        return self.voltage * self.no_load_speed
+
+    @property
     def fastest(self) -> float:
         """Highest speed of the shaft, rad/s: the commanded one, or that without a load."""
-        return self.voltage * self.no_load_speed if self.speed is None else self.speed
+        return self.free_speed if self.speed is None else self.speed
 
     @property
     def travel(self) -> float:
@@ -353,13 +364,13 @@ class MotorWinding(FeedbackWinding):
     def _shaft_at(self, load: float) -> float:
         """Speed of the shaft (rad/s) at which the motor has the torque of a load (N m)."""
         load /= self.derating
-        free = self.voltage * self.no_load_speed
+        free = self.free_speed
         on_line = free - self.no_load_speed * load / self.stall_torque
         return min(on_line, free * (1.0 - load / self.limit) / self.band)
 
     def usual_speed(self) -> float:
         """The commanded speed, or that at half the stalling torque, in m/s."""
-        half = 0.5 * self.voltage * self.no_load_speed
+        half = 0.5 * self.free_speed
         return self.travel * (half if self.speed is None else min(self.speed, half))
 
     def available_tension(self, *, at_speed: bool = False, losses: float = 1.0) -> float:
@@ -370,14 +381,14 @@ class MotorWinding(FeedbackWinding):
         """
         torque = self.available(0.0)
         if at_speed and self.speed is not None:
-            share = self.speed / (self.voltage * self.no_load_speed)
+            share = self.speed / self.free_speed
             limited = self.limit * (1.0 - self.band * share)
             torque = min(self.available(self.speed), self.derating * limited)
         return float(torque) / self.travel / (1.0 + losses * (1.0 / self.efficiency - 1.0))
 
     def told(self, speed: float, time: float) -> Self:
         """See ``Winding``: the motor winds, and has no torque at its speed without a load."""
-        free = self.voltage * self.no_load_speed
+        free = self.free_speed
         shaft = min(max(speed / self.travel, _LEAST_COMMAND * free), (1.0 - _LEAST_COMMAND) * free)
         if shaft == self.speed:
             return self
@@ -415,6 +426,7 @@ class MotorWinding(FeedbackWinding):
 # Winding with a smooth start.
 
 
+# Coefficients by power; a motor's ramp is the same quintic (tests/cable/test_motor_law.py).
 _RATE = {"cubic": (0.0, 0.0, 3.0, -2.0), "quintic": (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)}
 
 

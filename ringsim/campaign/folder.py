@@ -1,4 +1,4 @@
-"""A campaign's folder: its design, its identity, whether it may be gone on with; its merging."""
+"""A campaign's folder: its design, its identity, whether it may be gone on with."""
 
 import contextlib
 import functools
@@ -28,8 +28,8 @@ from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.journal import FOLDER, Survey, survey
 from ringsim.storage.netcdf import (
     GO_ON,
+    attributes_of_file,
     locked,
-    provenance,
     read_design,
     tries,
     write_design,
@@ -152,7 +152,7 @@ _ANEW = "requirements, outputs, checks or number of samples changed"
 def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str) -> None:
     wanted = campaign.specification
     model = Fidelity[wanted.fidelity.upper()]
-    made = provenance(name=wanted.name, title=wanted.title, action="designed", model=model)
+    made = attributes_of_file(name=wanted.name, title=wanted.title, action="designed", model=model)
     attributes = made | {
         "seed": wanted.seed, "solver": solver, "scene": campaign.scene.to_toml(),
         "campaign": campaign.text, "campaign_name": wanted.name,

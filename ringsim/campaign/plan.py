@@ -19,8 +19,9 @@ from ringsim.analysis.design import placement_of
 from ringsim.analysis.intervals import samples_needed
 from ringsim.analysis.requirements import Requirement, doubt_of
 from ringsim.campaign.folder import Folder, digests, opened_as, other_build
+from ringsim.campaign.merging import is_behind
 from ringsim.campaign.run import Order, grown, growth_told
-from ringsim.campaign.stopping import End, decided, is_behind, looks_of
+from ringsim.campaign.watch import End, decided, looks_of
 from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
 from ringsim.execution.work import Array, Work, relative_cost
@@ -32,10 +33,10 @@ from ringsim.sampling.designs.blocks import Grouped
 from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.distributions import labels_of
 from ringsim.storage.journal import Survey, survey
-from ringsim.storage.netcdf import NOT_RUN, in_use, runs_in
+from ringsim.storage.netcdf import in_use, runs_in
 from ringsim.storage.result import Result, check_of, sample_of
 from ringsim.tables import counted, size_text
-from ringsim.variables import Status
+from ringsim.variables import NO_CODE, Status
 
 Samples = NDArray[np.int64]
 _MOST_SHOWN = 10
@@ -330,7 +331,7 @@ def status_lines(campaign: Folder) -> list[str]:
     found, now, growth = campaign.survey(), time.time(), growth_told(campaign)
     left = len(found.missing)
     counts = Counter(found.status.tolist())
-    words = {int(Status.OK): Status.OK.word, NOT_RUN: "not_run"}
+    words = {int(Status.OK): Status.OK.word, NO_CODE: "not_run"}
     lines = [
         f"{campaign.attributes['campaign_name']}: {campaign.table.samples - left} of "
         f"{counted(campaign.table.samples, 'sample')} done, {left} left",
@@ -369,7 +370,7 @@ def status_lines(campaign: Folder) -> list[str]:
     checks = campaign.survey(checks=True) if running else found
     unfinished = [
         item for item in running.items()
-        if (found if item[0] >= 0 else checks).status[sample_of(item[0])] == NOT_RUN
+        if (found if item[0] >= 0 else checks).status[sample_of(item[0])] == NO_CODE
     ]  # fmt: skip
     if unfinished:
         longest = sorted(unfinished, key=lambda item: -item[1])[:_MOST_SHOWN]

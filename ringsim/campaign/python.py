@@ -19,6 +19,7 @@ import xarray as xr
 from ringsim.analysis.design import open_stored
 from ringsim.analysis.engines import too_far
 from ringsim.campaign.folder import open_folder
+from ringsim.campaign.merging import is_behind, merge
 from ringsim.campaign.plan import plan
 from ringsim.campaign.run import (
     Choices,
@@ -29,7 +30,6 @@ from ringsim.campaign.run import (
     start,
 )
 from ringsim.campaign.specification import campaign_of, load_campaign
-from ringsim.campaign.stopping import is_behind, merge
 from ringsim.choice import kind_of
 from ringsim.execution.child import end_with
 from ringsim.execution.mpi import launched_size

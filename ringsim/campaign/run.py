@@ -24,9 +24,15 @@ from ringsim.campaign.folder import (
     prepare_folder,
     require_this_build,
 )
+from ringsim.campaign.merging import merge
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
-from ringsim.campaign.stopping import Watch, as_decided, merge
-from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
+from ringsim.campaign.watch import (
+    Progress,
+    StopRequest,
+    Watch,
+    as_decided,
+    stopping_on_signals,
+)
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.slot import Local, Serial
 from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost

@@ -26,6 +26,7 @@ from ringsim.analysis.ladder import (
     shortened,
 )
 from ringsim.analysis.stability import cells_of, checked, chosen_for_check, compared, joined
+from ringsim.cable.records import CABLES
 from ringsim.campaign.run import run_cases
 from ringsim.choice import kinds_of
 from ringsim.overrides import field_at
@@ -37,7 +38,7 @@ from ringsim.sampling.table import refuse_fixed
 from ringsim.scene import Scene
 from ringsim.simulation import why_not_frame
 from ringsim.units import unit_at
-from ringsim.variables import GOALS, PLANES, Fate, Status
+from ringsim.variables import GOALS, Fate, Status
 
 # What a stability map varies: panels of two axes, on a user's scene.
 #
@@ -210,7 +211,7 @@ def _expanded(scene: Scene, path: str) -> tuple[str, ...]:
     head, star, tail = path.partition(".*.")
     if not star:
         return (path,)
-    present = [name for name in PLANES if getattr(scene.cables, name, None) is not None]
+    present = [name for name in CABLES if getattr(scene.cables, name, None) is not None]
     if head != "cables" or not present:
         raise InputError(f"* stands for every cable, and {scene.name} has none: name a path")
     return tuple(f"{head}.{name}.{tail}" for name in present)

@@ -1,4 +1,8 @@
-"""Watching a campaign: the progress bar, the progress file for others, the stop signals."""
+"""Watching a campaign: whether its samples are enough, at the same sample whoever has run them; the
+stop signals; the progress bar, and the progress file for others.
+"""
+
+from __future__ import annotations
 
 import contextlib
 import importlib.util
@@ -9,14 +13,165 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ringsim.analysis import derived
+from ringsim.analysis.design import placement
+from ringsim.analysis.requirements import OUTCOME, required_by
+from ringsim.analysis.verdicts import Rule, holds, rule_of
+from ringsim.campaign.folder import Folder
 from ringsim.files import whole
+from ringsim.refusal import InputError
 from ringsim.storage.result import Result, sample_of
 from ringsim.tables import counted
+
+# When samples are enough.
+#
+# Samples end in any order, and beyond the last look some have run already.  The rule asks only the
+# first samples of a look, all of them and no others, and only once they have all run: its answer is
+# a function of the campaign alone.
+
+
+_PAUSE = 2.0
+"""Seconds between two looks for samples of others, at least."""
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a campaign ended before its last sample, and why."""
+
+    samples: int
+    told: str
+
+
+def decided(campaign: Folder) -> End | None:
+    """The first look whose samples have all run and are enough; None if there is none (yet)."""
+    rule = rule_of(campaign.attributes)
+    if rule is None:
+        return None
+    judged = _Judge(campaign, rule)
+    try:
+        for count in judged.numbers:
+            told = judged.at(count)
+            if told is None:
+                return None
+            if told:
+                return End(count, told)
+    except InputError:  # a requirement that its samples do not tell of ends nothing
+        return None
+    return None
+
+
+def looks_of(campaign: Folder) -> list[int]:
+    """Samples at all looks of a campaign's rule; none without one."""
+    rule = rule_of(campaign.attributes)
+    return [] if rule is None else _Judge(campaign, rule).numbers
+
+
+def as_decided(campaign: Folder) -> Folder:
+    """A campaign up to where its rule has ended it, else as it is."""
+    return campaign if (end := decided(campaign)) is None else campaign.first(end.samples)
+
+
+class _Judge:
+    """What becomes of a rule at each look; reads every result once."""
+
+    def __init__(self, campaign: Folder, rule: Rule) -> None:
+        self._campaign, self._rule = campaign, rule
+        # Here: it takes half a second, and status looks at no rule.
+        import xarray as xr
+
+        self._empty = xr.Dataset(attrs=campaign.attributes)
+        self._placed = placement(self._empty)
+        self.numbers = rule.numbers(campaign.table.samples, self._placed.replicates)
+        self._requirements = required_by(campaign.attributes)
+        self._derived = derived.known_from(campaign.attributes)
+        named = [each.requirement or each.of for each in rule.conditions]
+        self._names = sorted({str(name) for name in named} - {OUTCOME})
+        self._known = {name: np.empty(0) for name in self._names}
+        self._present: set[str] = set()
+
+    def at(self, count: int) -> str | None:
+        """What shows that the samples of a look are enough, "" if they are not; None if some of
+        them, or of their checks, have not run.
+        """
+        first = self._campaign.first(count)
+        found = first.survey()
+        if len(found.missing) or len(first.unchecked()):
+            return None
+        before = len(next(iter(self._known.values()))) if self._names else count
+        more = {name: np.full(count - before, np.nan) for name in self._names}
+        for result in found.results(np.arange(before, count)) if self._names else ():
+            arrays = result.arrays()
+            each = {n: v[None] for n, v in arrays.items()}
+            arrays |= derived.over_samples(self._derived, each, arrays)
+            for name in self._names:
+                if name in arrays:
+                    more[name][result.sample - before] = arrays[name]
+                    self._present.add(name)
+        self._known = {n: np.append(self._known[n], more[n]) for n in self._names}
+        columns: dict[str, Any] = {"status": found.status, OUTCOME: found.fate}
+        columns |= {name: self._known[name] for name in self._present}
+        dataset = self._empty.assign({n: ("sample", v) for n, v in columns.items()})
+        dataset = dataset.assign_coords(sample=np.arange(count))
+        return holds(self._rule, dataset, self._requirements, self._placed)
+
+
+class Watch:
+    """Follows a running campaign from look to look."""
+
+    def __init__(self, campaign: Folder, again: Iterable[int] = ()) -> None:
+        """Watch a campaign of which the samples ``again`` run first, before any look."""
+        rule = rule_of(campaign.attributes)
+        self._judge = None if rule is None else _Judge(campaign, rule)
+        self._numbers = self._judge.numbers if self._judge is not None else []
+        self._most, self._again = campaign.table.samples, set(again)
+        self._left = Counter[int]()
+        self._next, self._asked, self._end = 0, -_PAUSE, ""
+
+    def in_order(self, numbers: Sequence[int]) -> list[int]:
+        """Samples and checks to be run, those first that the next look waits for."""
+        self._left = Counter(map(self._look_of, numbers))
+        return sorted(numbers, key=self._look_of)  # stable
+
+    def _look_of(self, number: int) -> int:
+        """The first look that waits for a sample, or for its check."""
+        sample = sample_of(number)
+        return 0 if sample in self._again else bisect_right(self._numbers, sample)
+
+    def finished(self, number: int) -> None:
+        """Note that a sample or check has run."""
+        self._left[self._look_of(number)] -= 1
+
+    def ended(self) -> str:
+        """Why the samples are enough, or an empty string; asked often.
+
+        InputError if the rule asks for what the samples do not tell.
+        """
+        while self._judge is not None and not self._end and self._next < len(self._numbers):
+            waits = any(self._left[look] for look in range(self._next + 1))
+            # Those of other parts of the campaign end when they end.
+            if waits or time.monotonic() - self._asked < _PAUSE:
+                break
+            count = self._numbers[self._next]
+            if (told := self._judge.at(count)) is None:
+                self._asked = time.monotonic()
+                break
+            if told:
+                self._end = f"{count} of at most {self._most} samples are enough: {told}"
+            self._next += 1
+        return self._end
+
+
+# Signals and progress.
+
 
 _STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 _PLAIN_SECONDS = 30.0

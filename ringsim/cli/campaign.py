@@ -13,7 +13,7 @@ from ringsim.campaign.folder import open_folder, other_build
 from ringsim.campaign.plan import plan, status_lines
 from ringsim.campaign.run import Order, Share, require_no_launcher, start
 from ringsim.campaign.specification import SOLVERS, load_campaign
-from ringsim.campaign.stopping import as_decided
+from ringsim.campaign.watch import as_decided
 from ringsim.cli.options import (
     FOLDER,
     PATH,

@@ -11,7 +11,8 @@ from ringsim.analysis.design import called, inputs, median_and_worst, open_store
 from ringsim.analysis.engines import check_lines
 from ringsim.analysis.requirements import parse_requirements, required_by
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.stopping import as_decided, is_behind, merge
+from ringsim.campaign.merging import is_behind, merge
+from ringsim.campaign.watch import as_decided
 from ringsim.cli.options import (
     ANIMATE,
     COLOUR,

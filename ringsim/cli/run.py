@@ -29,8 +29,7 @@ from ringsim.outputs.base import DOUBT, may_be_off
 from ringsim.parts.solver import Solver
 from ringsim.refusal import EXIT_DONE, EXIT_FAILED, InputError
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import Watch
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Watch
 from ringsim.stored_state import require_fit
 from ringsim.variables import GONE, Outcome
 

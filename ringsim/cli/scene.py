@@ -14,6 +14,7 @@ import numpy as np
 from click.shell_completion import CompletionItem
 
 from ringsim import extensions
+from ringsim.cable.ropes import CableFault
 from ringsim.choice import kind_of, kinds_of
 from ringsim.cli.options import PATH, SETTINGS
 from ringsim.files import require_place, write_text
@@ -179,21 +180,21 @@ def _doubtful(scene: Scene) -> Iterator[str]:
         radii = {f"{path}.pulley_radius": cable.pulley_radius}
         winches = {"winch": cable.winch, "far_winch": cable.far_winch}
         for name, winch in ((n, w) for n, w in winches.items() if w is not None):
-            radius = getattr(winch.winding, "drum_radius", None)
-            speed = getattr(winch.winding, "no_load_speed", 0.0)
-            if speed > _FASTEST:
-                yield (
-                    f"{path}.{name}.winding.no_load_speed = {speed:g} rad/s is above {_FASTEST:g} "
-                    f"rad/s: {speed:g} rev/min are {speed * math.tau / 60.0:.4g} rad/s"
-                )
-            motor = winch.winding.motor
-            constant, limit = motor and motor.torque_constant, motor and motor.current_limit
-            if motor and constant and limit and (most := motor.stall_torque / constant) < limit:
-                yield (
-                    f"{path}.{name}.winding.current_limit = {limit:g} A is above {most:.3g} A, "
-                    "what the motor takes when it stalls: it never acts"
-                )
-            radii |= {} if radius is None else {f"{path}.{name}.winding.drum_radius": radius}
+            if (motor := winch.winding.motor) is not None:
+                speed, limit = motor.no_load_speed, motor.current_limit
+                if speed > _FASTEST:
+                    yield (
+                        f"{path}.{name}.winding.no_load_speed = {speed:g} rad/s is above "
+                        f"{_FASTEST:g} rad/s: {speed:g} rev/min are {speed * math.tau / 60.0:.4g} "
+                        "rad/s"
+                    )
+                constant = motor.torque_constant
+                if constant and limit and (most := motor.stall_torque / constant) < limit:
+                    yield (
+                        f"{path}.{name}.winding.current_limit = {limit:g} A is above {most:.3g} A, "
+                        "what the motor takes when it stalls: it never acts"
+                    )
+                radii[f"{path}.{name}.winding.drum_radius"] = motor.drum_radius
             for key in ("start_time", "stop_time"):
                 if (time := getattr(winch, key)) is not None and time > end:
                     yield (
@@ -464,7 +465,7 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
     cables = scene.cables
     if cables is None or None in (cables.upper, cables.lower):
         return
-    struck = any(hasattr(one, "cable") and one.time <= AT_ONCE for one in scene.faults)
+    struck = any(isinstance(one, CableFault) and one.time <= AT_ONCE for one in scene.faults)
     if cables.upper == cables.lower and not struck:
         yield "both planes are equal: each gives half of the drive"
         return

@@ -19,11 +19,6 @@ from ringsim.core.tension import (
     Drums,
     RopeTable,
     Spans,
-    factors_needed,
-    measure,
-    slide,
-    tension_changes,
-    tighten,
     with_law_slopes,
 )
 
@@ -56,8 +51,6 @@ class Chain:
     >>> state = chain.state(chain.start(points), points, np.zeros((3, 3)), wound, speed)
     >>> state.tensions.round(2)
     array([51.44, 48.61])
-    >>> float(state.winch_power.sum().round(4)), state.friction_loss.round(4)
-    (0.2573, array([0.0071]))
     """
 
     def __init__(self, cables: Sequence[Cable], points_per_cable: Sequence[int]) -> None:
@@ -121,15 +114,15 @@ class Chain:
                 f"cable {ropes.cable[short] + 1}: {-drums.natural[short]:.4g} m more is wound "
                 "than there is rope (limit the winding law, or give the winch a stop_time)"
             )
-        slide(table, drums, spans)
+        call("slide", table, drums, spans)
         log_decays = np.zeros(len(ropes.behind))
-        tighten(table, drums, log_decays, spans)
+        call("tighten", table, drums, log_decays, spans)
         for _ in range(MOST_SOLVED):
             tensions = pulley_tensions(ropes, spans.tension)
             previous = log_decays
             seen = Pulleys(spans.angle, np.abs(spans.speed), tensions)
             log_decays = _whole(self.friction.decays(seen))
-            tighten(table, drums, log_decays, spans)
+            call("tighten", table, drums, log_decays, spans)
             if not self.friction.loads or np.abs(log_decays - previous).max(initial=0.0) < SOLVED:
                 return self.read(ropes, table, drums, spans, log_decays, wound, wound_rate)
         raise ValueError(UNSOLVED)
@@ -158,7 +151,7 @@ class Chain:
         self, state: ChainState, velocities: Array, slopes: Array, left: Array, by_place: float,
         by_rate: float, passing: float = PASSING,
     ) -> list[tuple[int, Array, Array]]:  # fmt: skip
-        """Changes of tension in each rope that is whole, in factors; see ``tension_changes``.
+        """Changes of tension in each rope that is whole, in factors (ropes.c).
 
         The velocities are those that the state was evaluated with, in m/s, shape (points, 3);
         ``slopes`` are those of the exponents after the speeds, in s/m, shape (pulleys,).  A rope
@@ -186,12 +179,12 @@ class Chain:
             state.shares, state.exponents, state.speeds,
         )  # fmt: skip
         drums = Drums(state.natural, state.wound_rates, np.zeros(len(ropes.starts)))
-        count, n = factors_needed(table, _whole(slopes)), ropes.spans
+        count, n = call("factors_needed", table, _whole(slopes)), ropes.spans
         pulls, found = np.zeros((count, n)), np.zeros((count, n, 3))
-        tension_changes(
-            table, drums, state.log_decays, _whole(friction.by_angle(state.pulleys)),
-            _whole(slopes), spans, _whole(velocities), _whole(left), by_place, by_rate, pulls,
-            found,
+        call(
+            "tension_changes", table, drums, state.log_decays,
+            _whole(friction.by_angle(state.pulleys)), _whole(slopes), spans, _whole(velocities),
+            _whole(left), by_place, by_rate, pulls, found,
         )  # fmt: skip
         told, row = [], 0
         for rope in np.flatnonzero(ropes.alive).tolist():
@@ -206,7 +199,7 @@ class Chain:
         if self._known is None or self._known[0] is not ropes:
             self._known = ropes, self.table(ropes), Spans.empty(ropes)
         _, table, spans = self._known
-        measure(table, ropes.behind, _whole(points), _whole(velocities), spans)
+        call("measure", table, ropes.behind, _whole(points), _whole(velocities), spans)
         ropes.require_length(spans.length)
         return table, spans
 

@@ -124,23 +124,6 @@ class Spans(NamedTuple):
                    np.zeros(pulleys), np.zeros(pulleys))  # fmt: skip
 
 
-def measure(table: RopeTable, behind: Indices, places: Array, rates: Array, spans: Spans) -> float:
-    """Lengths, rates, directions and angles of places and rates of the points, (points, 3);
-    returns the least length, m.
-    """
-    return float(call("measure", table, behind, places, rates, spans))
-
-
-def slide(table: RopeTable, drums: Drums, spans: Spans) -> None:
-    """Speeds of the ropes over the pulleys, and exponents of their friction."""
-    call("slide", table, drums, spans)
-
-
-def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> None:
-    """Tensions of all spans, whose speeds are known."""
-    call("tighten", table, drums, log_decays, spans)
-
-
 # Derivatives of the cable's forces after positions and velocities of its points.
 #
 # Every span pulls with f_i = T_i u_i, so with the differences D x = x_i+1 - x_i of the points
@@ -183,41 +166,3 @@ def with_law_slopes(
     """
     more = np.abs(exponents) * by_speed / np.minimum(log_decays, -1e-300)
     return np.asarray(slopes + np.where(np.abs(more) * slip_speed > passing, more, 0.0))
-
-
-def factors_needed(table: RopeTable, slopes: Array) -> int:
-    """Number of factors that ``tension_changes`` finds."""
-    return int(call("factors_needed", table, slopes))
-
-
-def tension_changes(
-    table: RopeTable,
-    drums: Drums,
-    log_decays: Array,
-    log_slopes: Array,
-    slopes: Array,
-    spans: Spans,
-    velocities: Array,
-    left: Array,
-    by_place: float,
-    by_rate: float,
-    pulls: Array,
-    changes: Array,
-) -> None:
-    """Changes of tension in k factors: tensions of the spans, N, shape (k, spans), and what they
-    change with, after the differences of the points, shape (k, spans, 3).
-
-    Derivatives after places are taken ``by_place`` times, those after rates ``by_rate`` times; both
-    results are zeros before.  The first factor of a rope is that of its mean tension, with the
-    share ``left`` of its stiffness that its winches do not answer.  ``log_slopes`` are the
-    derivatives of ``log_decays`` after the angles, 1/rad, ``slopes`` those of the exponents after
-    the rope's speed, s/m.
-
-    A pulley's friction changes all spans behind it, less their share of the path.  Pulleys between
-    which no span is felt change the same ones, and have one factor; their shares of the path go to
-    the last factor of the rope.
-    """
-    call(
-        "tension_changes", table, drums, log_decays, log_slopes, slopes, spans, velocities, left,
-        by_place, by_rate, pulls, changes,
-    )  # fmt: skip

@@ -17,8 +17,8 @@ from ringsim.exudyn.assembly import Array, Indices, axes_of, cross, gyration, sk
 #
 #     p = r - sense h b / \|b\|,   b = c_L + c_R,   c = y / \|y\| + t (y x z) / \|y x z\|,
 #
-# t = -sense for the left half and +sense for the right: the point of ``ringsim.exudyn.cable_path``
-# as a function of the coordinates alone.  A force F on the pulley acts on them as (dp/dq)^T F, the
+# t = -sense for the left half and +sense for the right: the point of ``CablePath`` below as a
+# function of the coordinates alone.  A force F on the pulley acts on them as (dp/dq)^T F, the
 # exact virtual work; as only directions count, it does none on the stretch of a cross-section.
 # With u = v / \|v\| and any constant vector g,
 #
@@ -130,7 +130,7 @@ class PlacedBlocks:
 # exact and resists nothing.  Source: paper 000, fig. 3.
 #
 # Nodes have Euler parameters; with rods of kind "ancf" those of the bar halves have slope vectors
-# instead, and blocks act on them as ``ringsim.exudyn.cable_path`` says.
+# instead, and blocks act on them as the head of this file says.
 
 
 WIDTH = 7

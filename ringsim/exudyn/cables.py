@@ -293,8 +293,7 @@ class CableDrive:
                 left: Array | float = 1.0
                 if self.winches.answering:
                     left = self.winches.stiffness_left(t, self.ropes, state.paths, state.path_rates)
-                slip = state.slip_speeds
-                own = (1.0 - state.exponents**2) / slip
+                slip, own = state.slip_speeds, state.exponent_slopes
                 slopes = self._turning.slopes(
                     self.ropes, state.speeds, own, lambda speed: np.tanh(speed / slip)
                 )

@@ -3,7 +3,6 @@ steps.
 """
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import exudyn as exu
@@ -15,7 +14,7 @@ from ringsim.exudyn.build import Built, build
 from ringsim.exudyn.laws import AngleForces
 from ringsim.exudyn.meters import (
     EnergyMeter,
-    Readings,
+    FullMeters,
 )
 from ringsim.exudyn.model import Openings, State, joint_groups
 from ringsim.layout.layout import Layout
@@ -23,7 +22,7 @@ from ringsim.outputs.meters import Reading
 from ringsim.outputs.recorder import Recorder
 from ringsim.rigid.statics import RopeReach, residual_tolerance, scales_of
 from ringsim.scene import Scene
-from ringsim.stepping.instant import Instant, Strained
+from ringsim.stepping.instant import Instant, Strained, Watch
 from ringsim.stepping.run import Run
 from ringsim.variables import Cause, Outcome, Reason
 
@@ -139,10 +138,6 @@ _REFUSE = 10.0
 """Error that makes exudyn repeat a step; its tolerance is 1."""
 
 
-Watch = Callable[[Instant], None]
-"""What is shown every accepted state of a run."""
-
-
 def solve(scene: Scene, watch: Watch | None = None) -> Outcome:
     """Run a scene.  A solve that fails is a status, not an exception."""
     built = build(scene)
@@ -166,7 +161,7 @@ class Integration(Run):
         self._now = State(model)
         self._openings = Openings(model)
         self._energy = EnergyMeter(built)
-        self._readings = Readings(built, self._now)
+        self._readings = FullMeters(built, self._now)
         self._gaps = joint_groups(model)
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None

@@ -13,8 +13,7 @@ from ringsim.exudyn.model import BuiltJoint, JointGroup, Multibody, State
 from ringsim.layout.bodies import turned_about_z
 from ringsim.layout.layout import Contact, Hung
 from ringsim.layout.points import HUB
-from ringsim.parts.laws import HUB as FREE
-from ringsim.parts.laws import AngleLaw, PairLaw, Reaction, Rub, Switches
+from ringsim.parts.laws import FREE_HUB, AngleLaw, PairLaw, Reaction, Rub, Switches
 from ringsim.units import at_section
 
 # Lines that carry corners, and their trolleys, as objects on the corners' nodes.
@@ -297,7 +296,7 @@ class PairForces:
 
 
 def _node(model: Multibody, body: int) -> Any:
-    return model.loose[HUB] if body == FREE else model.bodies[body][1]
+    return model.loose[HUB] if body == FREE_HUB else model.bodies[body][1]
 
 
 def _contact(model: Multibody, contact: Contact) -> Reacting:

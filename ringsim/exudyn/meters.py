@@ -196,7 +196,7 @@ _SENSES = np.array([[-1.0, -1.0, -1.0], [-1.0, 1.0, 1.0]])
 rates of which are w_x, -w_y and -w_z of the body."""
 
 
-class Readings(Meters):
+class FullMeters(Meters):
     """Measures the current state of a model, at what has been read of it."""
 
     def __init__(self, built: Built, state: State) -> None:

@@ -20,12 +20,7 @@ from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winches import Winches
 from ringsim.core.chain import Chain, Seen
 from ringsim.core.library import call
-from ringsim.core.tension import (
-    Drums,
-    RopeTable,
-    Spans,
-    factors_needed,
-)
+from ringsim.core.tension import Drums, RopeTable, Spans
 from ringsim.frame.elimination import Border
 from ringsim.frame.laws import Tape, taped
 from ringsim.frame.mesh import Indices, Mesh, Parts, Skeleton
@@ -39,7 +34,7 @@ from ringsim.layout.bodies import Array
 # ``ringsim.exudyn.cable_path`` for relative turns of the halves below three quarters of a turn.
 
 
-class Lines(NamedTuple):
+class PathPoints(NamedTuple):
     """Points of all paths, of every one: frame, arm, axes C, b, angle (-1: none) and share.
 
     ``span`` are the spans between different frames, ``near`` their first points (the other is the
@@ -73,9 +68,9 @@ class Arms(NamedTuple):
         return cls(*(np.zeros((points, 3)) for _ in range(3)))
 
 
-def lines_of(
+def path_points_of(
     skeleton: Skeleton, parts: Parts, paths: Sequence[Sequence[Sheave]], ropes: Ropes
-) -> Lines:
+) -> PathPoints:
     """The points of paths of a layout."""
     found = [_point(skeleton, sheave) for path in paths for sheave in path]
     frame, arm, axes, swung, angle, share = (np.array(each) for each in zip(*found, strict=True))
@@ -89,7 +84,7 @@ def lines_of(
         spans.append(span)
         fronts.append(front)
         local.append(row)
-    return Lines(
+    return PathPoints(
         frame, arm, axes, swung, angle, share, np.array(spans), ropes.near[spans],
         np.array(fronts), np.array(local),
     )  # fmt: skip
@@ -111,7 +106,7 @@ def _point(skeleton: Skeleton, sheave: Sheave) -> tuple[int, Array, Array, Array
 # Laws of the pulleys' friction, as recorded operations.
 
 
-class Laws(NamedTuple):
+class PulleyLaws(NamedTuple):
     """What friction laws say of pulleys: ln(eta), and its derivatives after angle and speed; and
     whether any depends on the speed of the rope, or on its tension; then how often tensions are
     sought at most, the least that laws see (N), and change of ln(eta) at which they are found.
@@ -154,7 +149,7 @@ class Roped(NamedTuple):
     ) -> "Roped":
         """Not yet measured, on so many unknowns."""
         pulleys, spans, count = len(ropes.behind), ropes.spans, len(table.starts)
-        most = factors_needed(table, np.ones(pulleys))
+        most = call("factors_needed", table, np.ones(pulleys))
         return cls(
             table, ropes.behind, Drums.still(count), Spans.empty(ropes),
             Seen.empty(pulleys), np.zeros(pulleys), np.ones(count), np.zeros((most, spans)),
@@ -187,7 +182,7 @@ class FrameCables:
         As of ``ringsim.exudyn.cables.CableDrive``.
     chain
         The laws of the ropes, of which the core's are the same.
-    lines, points
+    path_points, points
         What the paths run over; number of their points.
     laws, roped
         As tables.
@@ -202,10 +197,10 @@ class FrameCables:
         self.points = sum(len(path) for path in paths)
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
         self.ropes = self.chain.start(start)
-        self.lines = lines_of(skeleton, parts, paths, self.ropes)
+        self.path_points = path_points_of(skeleton, parts, paths, self.ropes)
         self._turned_at, self._turned = math.nan, _Turned(*np.zeros((2, len(own), 2)))
         friction = self.chain.friction
-        self.laws = Laws(
+        self.laws = PulleyLaws(
             self._taped(1, "decay"), self._taped(2, "by_angle", "by_speed"), friction.moves,
             friction.loads,
         )  # fmt: skip
@@ -297,7 +292,7 @@ class FrameCables:
         self._turned = _Turned(wound, rate)
 
     def _retable(self) -> None:
-        table = self.chain.table(self.ropes, self.lines.span)
+        table = self.chain.table(self.ropes, self.path_points.span)
         self.roped = Roped.of(self.ropes, table, self.points, self._unknowns, hub=self._hub)
         self._turned_at = math.nan
 

@@ -1,7 +1,7 @@
 """Time integration of a scene in joint coordinates; ``ringsim.stepping`` decides on the steps."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, cast
 
@@ -12,7 +12,7 @@ from ringsim.cable.ropes import CableFault, Ropes
 from ringsim.core.library import call
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
-from ringsim.frame.readings import EnergyMeter, Readings
+from ringsim.frame.readings import EnergyMeter, FrameMeters
 from ringsim.frame.state import State
 from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Array
@@ -24,7 +24,7 @@ from ringsim.refusal import InputError
 from ringsim.rigid.statics import scales_of
 from ringsim.scene import Scene
 from ringsim.stepping.control import go_on
-from ringsim.stepping.instant import Instant, Memory, Strained
+from ringsim.stepping.instant import Instant, Memory, Strained, Watch
 from ringsim.stepping.run import Run
 from ringsim.variables import Outcome
 
@@ -32,13 +32,8 @@ _EASY, _PATIENCE = 3, 4
 """Newton iterations up to which a step was easy, and steps after which, if they are not, the other
 polynomial is tried that may foretell the motion: a cubic where it is smooth, as at the speed of a
 flight, a parabola where ropes swing within a step."""
-_MOST = 25
-"""Iterations that count for a step that failed: as many as there are at most."""
 _SHORTEST = 1e-9
 """Step (s) below which Newton's failure ends a run, as of the full model."""
-
-Watch = Callable[[Instant], None]
-"""What is shown every accepted state of a run."""
 
 
 def solve(scene: Scene, watch: Watch | None = None) -> Outcome:
@@ -70,7 +65,7 @@ class Integration(Run):
         self._moves: list[tuple[float, Array]] = []
         self._taken, self._cubic, self._tried = [0, 0], True, 0
         self._steps: list[tuple[float, Array]] = []
-        self._readings = Readings(model)
+        self._readings = FrameMeters(model)
         self.history = Recorder(scene, self._readings.coordinates())
         ropes = None if model.cables is None else model.cables.ropes.content
         first = self._measure(0.0, self._now)
@@ -150,7 +145,8 @@ class Integration(Run):
         found = self.model.balance(time, step, self._now, after)
         self.history.newton_iterations += found.iterations
         self.history.jacobians += found.tangents
-        self._choose(_MOST if found.why else found.iterations)
+        # A step that failed counts as one that took all iterations there are.
+        self._choose(call("most_iterations") if found.why else found.iterations)
         if found.why:
             raise NoBalanceError(found.why)
 
@@ -196,7 +192,7 @@ class Integration(Run):
         """A state, with its cables, and what has passed since the one that was kept last."""
         cables = self.model.cables
         if cables is not None:
-            state.chain = cables.state(time, state.place.lines, state.rate.lines)
+            state.chain = cables.state(time, state.place.paths, state.rate.paths)
         return self._known(time, state)
 
     def _known(self, time: float, state: State) -> Instant:
@@ -358,7 +354,7 @@ class Storing(Integration):
         wound, rate = memory["wound"]
         before = [cable for _, cable in scene.cables.present()]
         cables.winches.go_on(memory["winches"], before, start.time, wound, rate)
-        place, moving = self._now.place.lines, self._now.rate.lines
+        place, moving = self._now.place.paths, self._now.rate.paths
         return cables.go_on(own.ropes, place, moving, wound, rate)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ringsim.choice import kind_of
 from ringsim.core.chain import Seen
 from ringsim.core.library import ASKED, NOT_ASKED, call, empty_of
-from ringsim.frame.cables import Arms, FrameCables, Laws, Lines, Roped
+from ringsim.frame.cables import Arms, FrameCables, PathPoints, PulleyLaws, Roped
 from ringsim.frame.elimination import Border, Fronts
 from ringsim.frame.laws import Acting, JointLaws, Openings
 from ringsim.frame.mesh import CURE, NOT_HERE, Mesh, Skeleton, mesh_of
@@ -22,8 +22,6 @@ from ringsim.frame.state import (
     Pose,
     State,
     Strains,
-    add_forces,
-    move,
     room_for_loads,
 )
 from ringsim.layout.bodies import Array
@@ -52,13 +50,13 @@ class System(NamedTuple):
     """
 
     mesh: Mesh
-    lines: Lines
+    paths: PathPoints
     held: Held
     joints: Acting
     rubbing: Seen
     web: Web
     coefficients: Coefficients
-    laws: Laws
+    laws: PulleyLaws
     arms: Arms
     fronts: Fronts
     loads: Array
@@ -163,13 +161,13 @@ class FrameModel:
         self.masses = mesh.point_mass.copy()
         np.add.at(self.masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
-        lines = 0 if self.cables is None else self.cables.points
+        of_paths = 0 if self.cables is None else self.cables.points
         ends = self.web.ends
         hung = self.layout.hung
         lines_on = [] if hung is None else list(hung.bodies)
         sizes = (
             3 * len(mesh.point_mass),
-            3 * lines,
+            3 * of_paths,
             len(angle),
             3 * len(ends),
             3 * self.with_hub,
@@ -189,8 +187,8 @@ class FrameModel:
         )
         self._kept = room_for_loads(mesh)
         self._string_spots = mesh.home[ends][:, None] + np.arange(3)
-        self._lines = empty_of(Lines) if self.cables is None else self.cables.lines
-        self._arms = Arms.empty(lines)
+        self._paths = empty_of(PathPoints) if self.cables is None else self.cables.path_points
+        self._arms = Arms.empty(of_paths)
         self.start = self._started(pose)
         self.hanging = None if hung is None else Hanging(hung, mesh, self.start.place.hung.copy())
         if self.hanging is not None:
@@ -205,9 +203,9 @@ class FrameModel:
     def begin_laws(self, laws: JointLaws) -> None:
         """Go on with the laws of joints as faults have left them."""
         self.laws = laws
-        of_pulleys = empty_of(Laws) if self.cables is None else self.cables.laws
+        of_pulleys = empty_of(PulleyLaws) if self.cables is None else self.cables.laws
         self.system = System(
-            self.mesh, self._lines, self._held, laws.acting, laws.rubbing, self.web,
+            self.mesh, self._paths, self._held, laws.acting, laws.rubbing, self.web,
             self.coefficients, of_pulleys, self._arms, self._fronts, self.loads, self._kept,
             self.lengths, self.lengths**2, np.zeros(self.size),
             np.zeros((call("most_iterations"), self.size)), self.reaction, self.with_hub,
@@ -244,7 +242,7 @@ class FrameModel:
 
     def balance(self, time: float, step: float, start: State, now: State) -> Balanced:
         """Bring a state into balance at a time (s), a step (s) after a start, in place."""
-        told, places, rates = np.zeros(3), now.place.lines, now.rate.lines
+        told, places, rates = np.zeros(3), now.place.paths, now.rate.paths
         tolerance, why = self.tolerance(step, float(now.strains.lead[0])), ""
         given = start.table, now.table, tolerance, told
         try:
@@ -304,7 +302,7 @@ class FrameModel:
     def _place(self, state: State) -> None:
         """Places of all followed coordinates at the state's pose."""
         call(
-            "put_in_place", self.mesh, self._lines, self._held, state.pose, state.hub, self._arms,
+            "put_in_place", self.mesh, self._paths, self._held, state.pose, state.hub, self._arms,
             state.followed.place,
         )  # fmt: skip
 
@@ -329,12 +327,13 @@ class FrameModel:
         if any(rod.nodes for rod in self.layout.rods):
             points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
             still = np.zeros_like(points)
-            add_forces(self.mesh, pose, points, still, state.strains, self._kept, unloaded)
+            given = pose, points, still, state.strains, self._kept, unloaded
+            call("add_forces", self.mesh, *given)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)
-        move(self.mesh, ahead.pose, small * self.first[: self.mesh.unknowns])
-        move(self.mesh, behind.pose, -small * self.first[: self.mesh.unknowns])
+        call("move", self.mesh, ahead.pose, small * self.first[: self.mesh.unknowns])
+        call("move", self.mesh, behind.pose, -small * self.first[: self.mesh.unknowns])
         if self.with_hub:
             self.first[-3:] = self.first[self._string_spots].mean(axis=0)
             ahead.hub += small * self.first[-3:]

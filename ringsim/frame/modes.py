@@ -15,9 +15,9 @@ from ringsim.frame.cables import FrameCables, Roped
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
 from ringsim.frame.model import FrameModel
-from ringsim.frame.readings import Readings
+from ringsim.frame.readings import FrameMeters
 from ringsim.frame.springs import STIFFNESS
-from ringsim.frame.state import Coefficients, State, add_forces, move
+from ringsim.frame.state import Coefficients, State
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.points import points_of
 from ringsim.parts.laws import AngleLaw, AngleRecord, Reaction, two_sided
@@ -39,7 +39,7 @@ from ringsim.scene.substituted import strained, substituted
 # in Mathematical Software III, 1977); a block finds modes of one frequency together, as rings have.
 
 
-PARTS = (
+ENERGY_PARTS = (
     "bending of rods",
     "stretch and twist of rods",
     "V-joints",
@@ -101,8 +101,8 @@ class Modes(NamedTuple):
     """What a structure does by itself about a state: n modes in the order of their w^2, (n,),
     rad^2/s^2, negative where it leaves that state; p points with their ``names`` and places, (p,
     3), m; shapes, (n, p, 3), whose largest way is 1, and their masses, (n,), kg; shares of
-    ``PARTS`` in their energy, (n, parts); effective masses along the axes, (n, 3), kg, none of
-    what floats free.
+    ``ENERGY_PARTS`` in their energy, (n, parts); effective masses along the axes, (n, 3), kg, none
+    of what floats free.
 
     ``rigid`` and ``mechanism`` are motions that nothing holds: of the whole, and of its parts.
     """
@@ -244,7 +244,7 @@ class Standing:
                 break
             change = -self._solve(self.unbalance()[:, None])[:, 0]
             change *= min(1.0, _FARTHEST / max(float(np.abs(change).max()), _FARTHEST))
-            move(model.mesh, self.state.pose, change[: model.mesh.unknowns])
+            call("move", model.mesh, self.state.pose, change[: model.mesh.unknowns])
             if model.with_hub:
                 self.state.hub += change[-3:]
         raise InputError(
@@ -257,7 +257,7 @@ class Standing:
         """Wind ropes until each has a tension, N: secants, as the structure gives."""
         content, last = cables.ropes.content, None
         for _ in range(_PATIENCE):
-            chain = cables.state(0.0, self.state.place.lines, self.state.rate.lines)
+            chain = cables.state(0.0, self.state.place.paths, self.state.rate.paths)
             # By the force before slack, which goes straight where the tension bends.
             width = chain.material[2]
             off = chain.forces - tension - width * np.log1p(-np.exp(-tension / width))
@@ -435,7 +435,7 @@ class Standing:
     def _told(self, squares: Array, vectors: Array, rigid: int, mechanism: int) -> Modes:
         """Modes of w^2 and their vectors, in columns."""
         model = self.model
-        readings, state = Readings(model), self.state.copy()
+        readings, state = FrameMeters(model), self.state.copy()
         shapes, shares = [], []
         for square, vector in zip(squares, vectors.T, strict=True):
             state.rate.points[...] = (self.moving @ vector).reshape(-1, 3)
@@ -452,15 +452,15 @@ class Standing:
         )  # fmt: skip
 
     def stored(self, vector: Array) -> list[float]:
-        """Energy of a change of the unknowns in ``PARTS`` but the last, J: from the strains that it
-        makes, and not from the tangent.
+        """Energy of a change of the unknowns in ``ENERGY_PARTS`` but the last, J: from the strains
+        that it makes, and not from the tangent.
         """
         model, mesh = self.model, self.model.mesh
         by = _NUDGE / float(np.abs(self.moving @ vector).max())
         strains, angles = [], []
         for way in (by, -by):
             state = self.state.copy()
-            move(mesh, state.pose, way * vector[: mesh.unknowns])
+            call("move", mesh, state.pose, way * vector[: mesh.unknowns])
             strains.append(self._strained(state))
             angles.append(model.openings.read(state.pose.angle, state.rate.angles)[0])
         strain, angle = ((one - other) / (2.0 * by) for one, other in (strains, angles))
@@ -475,8 +475,8 @@ class Standing:
         model, mesh = self.model, self.model.mesh
         call("place_points", mesh, state.pose, state.place.points)
         room, still = np.zeros_like(model.system.kept), np.zeros_like(state.place.points)
-        g = np.zeros(mesh.unknowns)
-        add_forces(mesh, state.pose, state.place.points, still, state.strains, room, g)
+        given = state.place.points, still, state.strains, room, np.zeros(mesh.unknowns)
+        call("add_forces", mesh, state.pose, *given)
         return state.strains.now
 
     def _in_joints(self, turned: Array) -> float:

@@ -27,7 +27,7 @@ _CLOSE = 1e-9
 """How far a point may be off those with mass of its body, m."""
 
 
-class Readings(Meters):
+class FrameMeters(Meters):
     """Measures states of a model.
 
     The rates that are followed are those of points with mass: a point of a rigid body is the same

@@ -11,8 +11,7 @@ from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
 from ringsim.frame.state import Pose, State
 from ringsim.layout.bodies import Array, skew
 from ringsim.layout.layout import Layout
-from ringsim.parts.laws import HUB as FREE
-from ringsim.parts.laws import PairLaw
+from ringsim.parts.laws import FREE_HUB, PairLaw
 from ringsim.refusal import InputError
 
 # Laws between bodies, and from bodies to the hub of a net, a point with three unknowns of its own
@@ -38,8 +37,8 @@ class Web(NamedTuple):
         """Those of a layout; InputError where no front has both bodies of a pair."""
         laws = layout.pair_laws
         bodies = np.concatenate([np.zeros((0, 2), np.int64), *(law.bodies for law in laws)])
-        ends = list(dict.fromkeys(bodies[bodies != FREE].tolist()))
-        number = {body: k for k, body in enumerate(ends)} | {FREE: -1}
+        ends = list(dict.fromkeys(bodies[bodies != FREE_HUB].tolist()))
+        number = {body: k for k, body in enumerate(ends)} | {FREE_HUB: -1}
         first, second = (
             np.array([number[k] for k in side], np.int64) for side in bodies.T.tolist()
         )
@@ -58,7 +57,7 @@ def _between(law: PairLaw) -> Law:
 
 
 def _spots(mesh: Mesh, first: int, second: int) -> tuple[int, int, int]:
-    if first == FREE:
+    if first == FREE_HUB:
         front, place = mesh.frame_local[second].tolist()
         return front, -1, place
     # The front of both bodies that is eliminated first.

@@ -72,30 +72,9 @@ class Strains(NamedTuple):
         return cls(np.zeros((elements, 6)), np.zeros((elements, 6)), np.zeros(1))
 
 
-def move(mesh: Mesh, pose: Pose, step: Array) -> None:
-    """Move a pose by changes of all unknowns, shape (unknowns,); in place."""
-    call("move", mesh, pose, step)
-
-
-def place_points(mesh: Mesh, pose: Pose, out: Array) -> None:
-    """Places of all points with mass, shape (p, 3)."""
-    call("place_points", mesh, pose, out)
-
-
 def room_for_loads(mesh: Mesh) -> Array:
     """Room for what elements hold, from ``add_forces`` to its derivative."""
     return np.zeros(call("room_for_loads", len(mesh.length)))
-
-
-def add_forces(
-    mesh: Mesh, pose: Pose, points: Array, accelerations: Array, strains: Strains, loads: Array,
-    g: Array,
-) -> None:  # fmt: skip
-    """Add forces of elastic rods and of inertia on all unknowns, shape (unknowns,); keeps what the
-    elements hold in ``loads`` (``room_for_loads``).  Places and accelerations are those of all
-    points, (p, 3).
-    """
-    call("add_forces", mesh, pose, points, accelerations, strains, loads, g)
 
 
 # Generalised-alpha on points and angles: rates and accelerations follow from places.
@@ -125,6 +104,9 @@ class Coefficients(NamedTuple):
         alpha_m, alpha_f = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
         gamma = 0.5 - alpha_m + alpha_f
         return cls(alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma)
+
+    # ``stiffen`` of newton.c has both as well; tests/frame/test_frame_tangent.py compares tangents
+    # with differences, with parts of either.
 
     def acceleration_by_place(self, step: float) -> float:
         """Derivative of a_1 after z_1, 1/s^2."""
@@ -187,7 +169,7 @@ class Groups(NamedTuple):
     """
 
     points: Array
-    lines: Array
+    paths: Array
     angles: Array
     ends: Array
     hub: Array
@@ -196,11 +178,11 @@ class Groups(NamedTuple):
     @classmethod
     def of(cls, values: Array, held: Held) -> "Groups":
         """Views of followed coordinates."""
-        points, lines, angles, *rest = [
+        points, paths, angles, *rest = [
             values[first:last] for first, last in pairwise(held.cuts.tolist())
         ]
         ends, hub, hung = (each.reshape(-1, 3) for each in rest)
-        return cls(points.reshape(-1, 3), lines.reshape(-1, 3), angles, ends, hub, hung)
+        return cls(points.reshape(-1, 3), paths.reshape(-1, 3), angles, ends, hub, hung)
 
 
 class Moving(NamedTuple):

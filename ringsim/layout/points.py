@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ringsim.layout.bodies import Array, InSpace, Joint, JointOpening, Mount, OnBody, OnRod
 from ringsim.layout.layout import Layout
-from ringsim.parts.laws import HUB as FREE
+from ringsim.parts.laws import FREE_HUB
 
 HUB, BOOM_TIP = "hub", "boom tip"
 """Points that stand on no body and no rod: the net's hub, the free end of a flexible boom."""
@@ -177,7 +177,7 @@ def _lines(layout: Layout) -> Iterator[tuple[str, Where, Where]]:
         yield "boom", layout.boom.top, BOOM_TIP
     for law in layout.pair_laws:
         for first, second in law.bodies.tolist():
-            yield law.group, OnBody(second), HUB if first == FREE else OnBody(first)
+            yield law.group, OnBody(second), HUB if first == FREE_HUB else OnBody(first)
 
 
 def _group(layout: Layout, body: int) -> str:

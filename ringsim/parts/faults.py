@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 
 
 AT_ONCE = 1e-8
-"""Faults strike together that are nearer than this, s: the accelerations of a shorter step are
-round-off of places (in steps of 1e-10 s they blew rings up that sound steps open)."""
+"""Faults strike together that are nearer than this, s: the accelerations of shorter steps are
+round-off of places.  Where Newton fails steps are as short as 1e-9 s, of which one does no harm;
+one of 1e-10 s moves the opening of ring18 by 1 ms, one of 1e-12 s by 0.3 s, and several blew rings
+up that sound steps open."""
 
 
 @dataclass

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from ringsim.parts.laws import Array
 from ringsim.units import (
     KilogramOrZero,
     ListIn,
@@ -102,7 +102,6 @@ class Loads(Model):
 # The suspension that carries a structure's weight in a ground test.
 
 
-Array = NDArray[np.float64]
 _Share = Annotated[float, Field(ge=-1.0, le=1.0), Unit("1")]
 
 

@@ -170,7 +170,7 @@ class Switches:
 # Laws on distances between the origins of two bodies.
 
 
-HUB = -1
+FREE_HUB = -1
 """Stands for a body: the free point of a net, where its strings balance."""
 
 
@@ -199,9 +199,10 @@ class PairRecord(Model):
 class PairLaw:
     """A record between bodies; arrays have the shape (pairs,).
 
-    ``bodies`` are their numbers, or ``HUB`` first, shape (pairs, 2); ``sections`` pick the values
-    of the record; ``lengths`` gives the natural lengths, m, when they are asked for.  ``places``
-    are the plane and section that results tell the tension of each pair at; empty: they do not.
+    ``bodies`` are their numbers, or ``FREE_HUB`` first, shape (pairs, 2); ``sections`` pick the
+    values of the record; ``lengths`` gives the natural lengths, m, when they are asked for.
+    ``places`` are the plane and section that results tell the tension of each pair at; empty: they
+    do not.
     ``category`` is that of the standard for margins; None for what the drive does not meet.
     """
 
@@ -226,7 +227,7 @@ class PairLaw:
     @property
     def hung(self) -> bool:
         """Whether its pairs are strings from the hub."""
-        return bool((self.bodies == HUB).any())
+        return bool((self.bodies == FREE_HUB).any())
 
     def reaction(self, lengths: Array, rates: Array) -> Reaction:
         """At lengths (m) and rates (m/s) of all pairs."""

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from ringsim.parts.laws import (
-    HUB,
+    FREE_HUB,
     Array,
     Corners,
     PairLaw,
@@ -149,7 +149,7 @@ class SpringNet(Net):
     def laws(self, corners: Corners) -> list[PairLaw]:
         """See ``Net``."""
         ends = corners.row(0)
-        bodies = np.stack([np.full(len(ends), HUB), ends], axis=1)
+        bodies = np.stack([np.full(len(ends), FREE_HUB), ends], axis=1)
         natural = np.full(len(ends), self.neutral_length)
         return [PairLaw("net", self, bodies, np.arange(len(ends)), lambda: natural, "spring")]
 

@@ -19,7 +19,7 @@ from ringsim.analysis.design import (
 )
 from ringsim.analysis.intervals import ALIKE, good, hardly_apart, numbers, tells_of, used
 from ringsim.analysis.posterior import UNEXPLAINED
-from ringsim.analysis.residuals import Residuals
+from ringsim.analysis.residuals import BAND, Residuals
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import (
@@ -396,10 +396,6 @@ def measured_and_computed(found: list[Residuals], title: str) -> Figure:
     return figure
 
 
-_BAND = 1.6449
-"""Half of what holds 90 % of a normal variable, in sigmas."""
-
-
 @style.styled
 def learnt(posterior: xr.Dataset) -> Figure:
     """What a calibration has found: on the left each unknown before the data (grey, 90 %) and after
@@ -413,15 +409,15 @@ def learnt(posterior: xr.Dataset) -> Figure:
         one = posterior.isel(unknown=k)
         quantiles = one["posterior_quantile"].values
         factor, units = readable(str(one["unknown_units"].item()), float(np.abs(quantiles).max()))
-        half = _BAND * float(one["learnt"])
-        left.barh(k, 2.0 * _BAND, left=-_BAND, height=0.62, color=style.GREY, alpha=0.3)
+        half = BAND * float(one["learnt"])
+        left.barh(k, 2.0 * BAND, left=-BAND, height=0.62, color=style.GREY, alpha=0.3)
         left.errorbar(float(one["shift"]), k, xerr=half, fmt="o", color=style.BLUE, markersize=5,
                       capsize=3, linewidth=1.8)  # fmt: skip
         told = f"{number_text(factor * quantiles[1], 4)} {unit_text(units)}".rstrip()
         names.append(f"{one['unknown'].item()}\n{told}")
     left.set_yticks(range(unknowns), names)
-    shifts, halves = posterior["shift"].values, _BAND * posterior["learnt"].values
-    ends = np.concatenate([shifts - halves, shifts + halves, [-_BAND, _BAND]])
+    shifts, halves = posterior["shift"].values, BAND * posterior["learnt"].values
+    ends = np.concatenate([shifts - halves, shifts + halves, [-BAND, BAND]])
     left.set_xlim(1.05 * ends.min(), 1.05 * ends.max())
     left.set_xlabel("Sigmas of the prior from its median")
     left.set_title("Unknowns before (grey) and after the data: 90 %, median", fontsize=10)

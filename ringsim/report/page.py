@@ -57,9 +57,9 @@ _PLACES = re.compile(
 )
 """What differs between antennas that ended alike: V-joints by name, numbers, and plurals."""
 _MOST_NAMED = 20
+"""Samples of a row that are named."""
 _LONGEST = 400
 """Characters of a value of the scene that are shown: those of a list for 36 hinges."""
-"""Samples of a row that are named."""
 Rows = list[list[str]]
 
 
@@ -159,9 +159,9 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
     """
     wanted = campaign_file(campaign)
     settings = flat(wanted.get("set", {}))
-    called = str(campaign.attrs.get("campaign", ""))
+    file = str(campaign.attrs.get("campaign", ""))
     settings |= {BARS: True} if wanted.get("error_bars_every") else {}
-    settings |= dict.fromkeys(re.findall(r"^# called with --set (\S+) =", called, re.MULTILINE))
+    settings |= dict.fromkeys(re.findall(r"^# called with --set (\S+) =", file, re.MULTILINE))
     varies = by_path(campaign)
     drawn = [*varies]
     text = builtin_scenes().get(str(wanted.get("scene", "")), "")

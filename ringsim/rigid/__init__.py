@@ -1,1 +1,1 @@
-"""The ring as a mechanism of rigid rods: mobility, start, statics, and the margin of its drive."""
+"""The ring as a mechanism of rigid rods: assembly, start, statics, and the margin of its drive."""

@@ -26,7 +26,7 @@ def check_parts(scene: "Scene") -> None:
 def check_controller(scene: "Scene") -> None:
     """Refuse (ValueError) winches as only runs leave them, and a controller that has none."""
     for name, winch in named_winches(scene).items():
-        if getattr(winch.winding, "told_before", False):
+        if winch.winding.told_before:
             raise ValueError(
                 f"cables.{name.replace(' far', '.far_winch')}: begun, from_speed and wound_before "
                 "are written by runs: leave them out"
@@ -82,8 +82,8 @@ def _check_frequency(scene: "Scene") -> None:
     name = "record.frequency = true"
     if scene.stop is None:
         raise ValueError(f'{name}: stop = "none" latches no V-joint: give stop.stiffness')
-    if (kind := kind_of(scene.rods)) != "geometrically-exact":
-        raise ValueError(f'{name}: rods.kind = "{kind}": frequencies are those of '
+    if not scene.rods.oriented:
+        raise ValueError(f'{name}: rods.kind = "{kind_of(scene.rods)}": frequencies are those of '
                          "geometrically-exact rods: leave rods.kind out")  # fmt: skip
     if "opening_angle" not in type(scene.structure).model_fields:
         raise ValueError(f'{name}: structure.kind = "{kind_of(scene.structure)}" has no '

@@ -138,7 +138,7 @@ class RunControl(Remembering):
         """The next step, s; it must not pass the time ``next_event`` (s), as of a fault."""
         self._steps.step = min([self._steps.step, *(one.limit for one in self._indicators)])
         end = min(self._solver.end_time, self._settled_at)
-        # What comes at once with the end is left to it: no step is as short as that.
+        # What comes at once with the end is left to it: the step between them would be too short.
         end = next_event if next_event < end - AT_ONCE else end
         step = self._steps.towards(end - self.now.time)
         self._cut = self._sampled and step < self._steps.step

@@ -3,7 +3,7 @@
 import json
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple
@@ -79,6 +79,10 @@ class Instant:
     """Largest strain of a rope."""
     driven: bool = False
     """Whether a winch turns or will turn on its rope, or a fault is still to come."""
+
+
+Watch = Callable[[Instant], None]
+"""What is shown every accepted state of a run."""
 
 
 class Scales(NamedTuple):

@@ -7,11 +7,18 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.parts.faults import AT_ONCE, Faults, Struck
 from ringsim.stepping.control import RunControl
-from ringsim.stepping.instant import Energies, Instant, Remembering, Scales, Strained
+from ringsim.stepping.instant import (
+    Array,
+    Energies,
+    Instant,
+    Remembering,
+    Scales,
+    Strained,
+    Watch,
+)
 from ringsim.stepping.locks import Latches, locks_of
 
 if TYPE_CHECKING:
@@ -22,9 +29,6 @@ if TYPE_CHECKING:
     from ringsim.outputs.recorder import Recorder
     from ringsim.parts.laws import Switches
     from ringsim.scene import Scene
-
-Array = NDArray[np.float64]
-
 
 # The times at which something begins, ends or breaks in a scene: steps end there.
 #
@@ -128,7 +132,7 @@ class Run(Remembering):
     _cables: Cables | None
     history: "Recorder"
 
-    def __init__(self, scene: "Scene", watch: Any) -> None:
+    def __init__(self, scene: "Scene", watch: Watch | None) -> None:
         self._scene, self._watch = scene, watch
         self._faults, self._events = Faults(scene.faults), Events(scene)
         self._sampler = None if scene.controller is None else scene.controller.sampler(scene)

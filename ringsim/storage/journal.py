@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from ringsim.files import DESIGN, sync, whole, writing
 from ringsim.refusal import InputError
-from ringsim.storage.netcdf import GO_ON, NOT_RUN
+from ringsim.storage.netcdf import GO_ON
 from ringsim.storage.result import Result
 from ringsim.tables import counted
-from ringsim.variables import Fate, Status
+from ringsim.variables import NO_CODE, Fate, Status
 
 # What was verified of the journals, so that nobody computes their checksums again.
 #
@@ -223,7 +223,7 @@ class Survey:
 
     journals: list[Path]
     status: NDArray[np.int8]
-    """Status of each sample, NOT_RUN where there is no result."""
+    """Status of each sample, NO_CODE where there is no result."""
     fate: NDArray[np.int8]
     """What the antenna did in each sample; NONE where nobody knows."""
     seconds: NDArray[np.float64]
@@ -239,7 +239,7 @@ class Survey:
     @property
     def missing(self) -> NDArray[np.int64]:
         """Samples without a result."""
-        return np.flatnonzero(self.status == NOT_RUN)
+        return np.flatnonzero(self.status == NO_CODE)
 
     @property
     def failed(self) -> NDArray[np.int64]:
@@ -313,7 +313,7 @@ def survey(folder: Path, run_with: Sequence[str], *, checks: bool = False) -> Su
 
     return Survey(
         journals,
-        status=of_each(records["status"][best], NOT_RUN),
+        status=of_each(records["status"][best], NO_CODE),
         fate=of_each(records["fate"][best], Fate.NONE),
         seconds=of_each(records["seconds"][best], np.nan),
         form=of_each(np.unique(records["form"][best], return_inverse=True)[1], -1),

@@ -25,15 +25,12 @@ from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.columns import Table, add_inputs, read_inputs
 from ringsim.storage.result import MISSING_COUNT
 from ringsim.units import Model
-from ringsim.variables import Fidelity, Variable, flags_of
+from ringsim.variables import NO_CODE, Fidelity, Variable, flags_of
 
 # How variables lie in netCDF files, and where these come from; ``design.nc``.
 
 
 _PACKAGES = ("exudyn", "numpy", "scipy", "netCDF4", "mpi4py")
-
-NOT_RUN = -1
-"""Value of ``status`` for samples that have not been run, and of codes that are missing."""
 
 CHUNK_BYTES = 1 << 20
 """Size of what is compressed at once, about."""
@@ -117,7 +114,7 @@ def add_variable(
     if definition.flags is not None:
         flags = flags_of(definition.flags)
         missing = "not_run" if definition.name.startswith("status") else "unknown"
-        variable.flag_values = np.append(np.int8(NOT_RUN), flags["flag_values"])
+        variable.flag_values = np.append(np.int8(NO_CODE), flags["flag_values"])
         variable.flag_meanings = f"{missing} {flags['flag_meanings']}"
 
 
@@ -171,7 +168,7 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
     return table, attributes
 
 
-def provenance(*, name: str, title: str, action: str, model: Fidelity) -> dict[str, Any]:
+def attributes_of_file(*, name: str, title: str, action: str, model: Fidelity) -> dict[str, Any]:
     """Attributes after ACDD: by whom, when, where and with what a campaign's file was made."""
     versions = {f"{package}_version": version(package) for package in _PACKAGES}
     now = datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")

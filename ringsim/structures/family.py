@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ringsim.cable.records import points_of
+from ringsim.cable.records import points_along
 from ringsim.layout.layout import Layout
 from ringsim.units import Model, PerSection, Unit
 
@@ -58,7 +58,7 @@ class Structure(Model):
     @classmethod
     def cable_points(cls, sections: int) -> tuple[str, ...]:
         """Names of what a cable runs along, from section 1 on."""
-        return points_of(sections)
+        return points_along(sections)
 
     @property
     def push(self) -> float:

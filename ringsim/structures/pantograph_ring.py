@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim.choice import kind_of
-from ringsim.layout.bodies import Lump
+from ringsim.layout.bodies import Array, Lump
 from ringsim.layout.draft import BodyRef, Draft, Track
 from ringsim.layout.layout import Layout
 from ringsim.parts.rods import errors_of
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 # keeps all rod lengths, so each is an exact, stress-free configuration.
 
 
-Array = NDArray[np.float64]
 _UP = np.array([0.0, 0.0, 1.0])
 _SIGNED = np.array([_UP, -_UP])[:, None]
 """Outward in the upper and in the lower plane, shape (2, 1, 3)."""
@@ -398,7 +396,7 @@ class PantographRing(Structure):
         given = (name for name in ("hinge_error", "angle_error") if getattr(self, name) is not None)
         return next(given, "")
 
-    def held_angles(self) -> NDArray[np.float64] | None:
+    def held_angles(self) -> Array | None:
         """See ``Structure``."""
         if self.angle_error is None:
             return None
@@ -439,7 +437,7 @@ class PantographRing(Structure):
         """See ``Structure``."""
         return float(np.sum(cable.bracket.path_slope(self.half_bar, cable.block_offset, angles)))
 
-    def basis(self, coordinate: float) -> NDArray[np.float64]:
+    def basis(self, coordinate: float) -> Array:
         """See ``Structure``: 1, cos(phi), sin(phi) and sin(theta), d cos(theta) = l cos(phi).
 
         The distance of two corners 2 (l cos(phi) + a), half the height d sin(theta) and the

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import model_validator
 
 from ringsim.choice import kind_of
-from ringsim.layout.bodies import Lump, axes_along
+from ringsim.layout.bodies import Array, Lump, axes_along
 from ringsim.layout.draft import Draft, Track
 from ringsim.layout.layout import OWN, Contact, Layout
 from ringsim.parts.laws import PairLaw, PairRecord, Reaction, one_sided, two_sided
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 #                                    s^2 = q^2 + p^2 - 2 q p cos g,      ds/dg = q p sin g / s
 #
 # Source: paper 001, figs 4 and 7.
-
-
-Array = NDArray[np.float64]
 
 
 class TrussPoints(NamedTuple):
@@ -343,7 +340,7 @@ class PlanarTruss(Structure):
         return draft.finish()
 
 
-def _slender(group: str, per_length: float, centre: NDArray[np.float64]) -> Lump:
+def _slender(group: str, per_length: float, centre: Array) -> Lump:
     """A slender rod (kg/m) from the body's origin to twice ``centre``, with little inertia about
     its own line.
     """

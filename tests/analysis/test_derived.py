@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from ringsim import InputError, analyse, compare
 from ringsim.analysis import derived
 from ringsim.analysis.derived import FUNCTIONS, Derived, over_samples
-from ringsim.campaign import stopping
+from ringsim.campaign import merging
 from ringsim.campaign.specification import Campaign, campaign_of
 from ringsim.cli import cli
 from ringsim.outputs import VARIABLES
@@ -293,7 +293,7 @@ apart = "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
 
     outputs = outputs.replace("largest pull", "least pull").replace("max(cable", "min(cable")
     Path("own.toml").write_text(FILE.format(outputs=outputs, more=more), encoding="utf-8")
-    monkeypatch.setattr(stopping, "BLOCK_BYTES", 1)  # sample by sample, as blocks of large ones
+    monkeypatch.setattr(merging, "BLOCK_BYTES", 1)  # sample by sample, as blocks of large ones
     monkeypatch.setattr(netcdf, "CHUNK_BYTES", 1)
     assert "3 of 3" in call("campaign", "own.toml", "--workers=0")
     again = xr.load_dataset("runs/own/campaign.nc")

@@ -373,7 +373,7 @@ def test_intervals_of_given_data_indices_cover(kind, case):
     for seed in range(campaigns):
         x = points(kind, 400, 8, seed)
         y = ishigami(x)
-        part = np.arange(400) % (indices.PARTS if kind == "random" else 8)
+        part = np.arange(400) % (indices.JACKKNIFE_PARTS if kind == "random" else 8)
         bins = [indices.Bins(column) for column in x.T]
         ends.append([indices.interval(*indices.index(each, y, part)) for each in bins])
     share = covered(ends, true)

@@ -42,6 +42,21 @@ def decays(state):
         return state.shares / state.shares[state.ropes.starts][state.ropes.of_span]
 
 
+def friction_loss(state):
+    """Power lost on each pulley, in W, shape (pulleys,)."""
+    return state.friction_forces * state.speeds
+
+
+def damping_loss(state):
+    """Power lost inside each rope, in W, shape (ropes,)."""
+    return state.viscous_forces * state.strain_rates * state.natural
+
+
+def winch_power(state):
+    """Power that the winches at both ends of each cable put in, in W, shape (cables, 2)."""
+    return state.winch_tensions * (1.0 + state.strains[state.ropes.of_end]) * state.wound_rate
+
+
 @dataclass
 class Case:
     """A chain in motion; rope wound is counted from a rope as long as its path."""

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from cable_cases import still
 from ringsim.cable.records import Winch
 from ringsim.cable.winches import Winches
-from ringsim.cable.winding import MotorWinding, StallWinding
+from ringsim.cable.winding import MotorWinding, RampWinding, StallWinding
 
 pytestmark = pytest.mark.quick
 
@@ -194,3 +194,14 @@ def test_what_a_motor_holds_after_the_lock_it_holds_by_its_gear(
     assert isinstance(held, StallWinding)
     assert held.limits()[0] == least * winding.usual_speed()
     assert held.max_tension == 5.0
+
+
+def test_a_motor_rises_along_the_quintic_of_a_ramp():
+    ramped = motor(speed=300.0, ramp=2.0)
+    ramp = RampWinding(speed=ramped.travel * 300.0, duration=2.0)
+    times = np.linspace(0.0, 2.5, 26)
+    speed, rate = ramped.commanded(times)
+    assert ramped.travel * speed == pytest.approx([ramp.wound_rate(t) for t in times])
+    small = 1e-6
+    ahead, behind = (ramped.commanded(times[1:-1] + by)[0] for by in (small, -small))
+    assert rate[1:-1] == pytest.approx((ahead - behind) / (2.0 * small), abs=1e-5)

@@ -11,10 +11,10 @@ import xarray as xr
 from loops import for_each
 
 from campaign_bench import Bench, comparable, journals, lose
-from ringsim.campaign import stopping
+from ringsim.campaign import merging
 from ringsim.campaign.folder import open_folder
+from ringsim.campaign.merging import merge
 from ringsim.campaign.specification import load_campaign
-from ringsim.campaign.stopping import merge
 from ringsim.refusal import InputError
 from ringsim.storage.journal import read_journal
 from ringsim.storage.result import check_of, sample_of
@@ -53,7 +53,7 @@ def stored(bench):
 def test_the_file_does_not_depend_on_how_much_is_written_at_once(checked, monkeypatch):
     whole = checked.result("out")
     for name, size in (("_ROWS", 2), ("BLOCK_BYTES", 1), ("_READ", 1)):
-        monkeypatch.setattr(stopping, name, size)
+        monkeypatch.setattr(merging, name, size)
     merge(open_folder(checked.folder / "out"), execution="", partly=True)
     xr.testing.assert_equal(checked.result("out"), whole)
 

@@ -14,8 +14,8 @@ import pytest
 
 from campaign_bench import START, assert_same, finished, lose, opened, ranks_of
 from ringsim.campaign.folder import open_folder
+from ringsim.campaign.merging import merge
 from ringsim.campaign.run import Choices, run_campaign
-from ringsim.campaign.stopping import merge
 from ringsim.execution.slot import Serial
 from ringsim.execution.work import Allowance
 from ringsim.storage.netcdf import locked

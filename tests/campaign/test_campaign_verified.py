@@ -10,7 +10,7 @@ import pytest
 
 from campaign_bench import START, assert_same, finished, journals
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.stopping import merge
+from ringsim.campaign.merging import merge
 from ringsim.storage import journal as journal_file
 from ringsim.storage.journal import FOLDER, NAME, Journal, read_journal, survey
 from ringsim.storage.result import Result, pack, stacked

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ringsim.core.library import call
 from ringsim.frame.model import FrameModel
-from ringsim.frame.state import State, move
+from ringsim.frame.state import State
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ class Probe:
 
     def _moved(self, by: Array) -> State:
         state, unknowns = self._start.copy(), self.model.mesh.unknowns
-        move(self.model.mesh, state.pose, by[:unknowns])
+        call("move", self.model.mesh, state.pose, by[:unknowns])
         if self.model.with_hub:
             state.hub += by[-3:]
         return state
@@ -64,7 +64,7 @@ class Probe:
 
     def _on_top(self, base: State, by: Array) -> Array:
         state, unknowns = base.copy(), self.model.mesh.unknowns
-        move(self.model.mesh, state.pose, by[:unknowns])
+        call("move", self.model.mesh, state.pose, by[:unknowns])
         if self.model.with_hub:
             state.hub += by[-3:]
         return self._unbalanced(state)

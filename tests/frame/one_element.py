@@ -13,12 +13,7 @@ from scipy.spatial.transform import Rotation
 from ringsim.core.library import call
 from ringsim.frame.elimination import Fronts
 from ringsim.frame.mesh import Mesh
-from ringsim.frame.state import (
-    Pose,
-    Strains,
-    add_forces,
-    room_for_loads,
-)
+from ringsim.frame.state import Pose, Strains, room_for_loads
 
 Array = NDArray[np.float64]
 LENGTH = 0.3
@@ -86,8 +81,8 @@ def _loaded(ends: Ends) -> tuple[Pose, Array, Array, Array, Array]:
     points = np.array([ends.x1, ends.x2])
     pose = Pose(points.copy(), np.array([ends.r1, ends.r2]), np.zeros(0))
     now, loads, found = np.zeros((1, 6)), room_for_loads(_MESH), np.zeros(12)
-    rest = np.zeros((2, 3))
-    add_forces(_MESH, pose, points, rest, Strains(now, np.zeros((1, 6)), np.zeros(1)), loads, found)
+    rest, strained = np.zeros((2, 3)), Strains(now, np.zeros((1, 6)), np.zeros(1))
+    call("add_forces", _MESH, pose, points, rest, strained, loads, found)
     return pose, points, now[0], loads, found
 
 

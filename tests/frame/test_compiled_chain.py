@@ -14,17 +14,7 @@ from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winding import ConstantWinding
 from ringsim.core.chain import Chain
 from ringsim.core.library import call
-from ringsim.core.tension import (
-    PASSING,
-    Drums,
-    RopeTable,
-    Spans,
-    factors_needed,
-    measure,
-    slide,
-    tension_changes,
-    tighten,
-)
+from ringsim.core.tension import PASSING, Drums, RopeTable, Spans
 from ringsim.frame.integrate import Integration
 from ringsim.frame.model import FrameModel
 
@@ -66,11 +56,11 @@ class Case:
         natural = self.ropes.content - self.ropes.per_rope(self.wound)
         self.drums = Drums(natural, self.ropes.per_rope(self.wound_rate), inflow)
         self.spans = Spans.empty(self.ropes)
-        least = measure(self.table, self.ropes.behind, self.points, self.rates, self.spans)
+        least = call("measure", self.table, self.ropes.behind, self.points, self.rates, self.spans)
         assert least == pytest.approx(self.spans.length.min())
         self.log_decays = self.evaluated().log_decays
-        slide(self.table, self.drums, self.spans)
-        tighten(self.table, self.drums, self.log_decays, self.spans)
+        call("slide", self.table, self.drums, self.spans)
+        call("tighten", self.table, self.drums, self.log_decays, self.spans)
 
     def evaluated(self) -> ChainState:
         return self.chain.state(self.ropes, self.points, self.rates, self.wound, self.wound_rate)
@@ -88,9 +78,9 @@ def test_accepted_states_are_those_of_the_chain(faults: bool) -> None:
     time = run.run().times[-1]
     cables, state = run.model.cables, run.state
     assert cables is not None
-    found = cables.state(time, state.place.lines, state.rate.lines)
+    found = cables.state(time, state.place.paths, state.rate.paths)
     wound = found.wound, found.wound_rate
-    truth = cables.chain.state(cables.ropes, state.place.lines, state.rate.lines, *wound)
+    truth = cables.chain.state(cables.ropes, state.place.paths, state.rate.paths, *wound)
     assert found.tensions.max() > 1.0
     assert found.ropes.alive.tolist() == ([True, True, False] if faults else [True, True])
     for field in fields(ChainState):
@@ -114,12 +104,12 @@ def test_the_border_is_the_tangent_of_the_chain(
     left = LEFT[: len(ropes.starts)]
     own = truth.exponent_slopes
     slopes = np.where(own * truth.slip_speeds > PASSING, own, 0.0)
-    count, points = factors_needed(case.table, slopes), sum(POINTS)
+    count, points = call("factors_needed", case.table, slopes), sum(POINTS)
     pulls, changes = np.zeros((count, ropes.spans)), np.zeros((count, ropes.spans, 3))
     log_slopes = truth.friction.by_angle(truth.pulleys)
-    tension_changes(
-        case.table, case.drums, case.log_decays, log_slopes, slopes, case.spans, case.rates, left,
-        1.0, by_rate, pulls, changes,
+    call(
+        "tension_changes", case.table, case.drums, case.log_decays, log_slopes, slopes, case.spans,
+        case.rates, left, 1.0, by_rate, pulls, changes,
     )  # fmt: skip
     out = np.zeros((2, count, points, 3))
     call("spread_changes", case.table, case.spans, pulls, changes, out)
@@ -156,7 +146,8 @@ def test_the_border_is_the_tangent_of_the_chain(
                 expected[point, :, other + 1] -= block
                 expected[point + 1, :, other + 1] += block
     if unfelt:
-        separate = factors_needed(case.table._replace(felt=np.ones_like(case.table.felt)), slopes)
+        felt = case.table._replace(felt=np.ones_like(case.table.felt))
+        separate = call("factors_needed", felt, slopes)
         assert count < separate
     for near in sorted(ropes.near[list(unfelt)], reverse=True):
         for each in (expected, found):

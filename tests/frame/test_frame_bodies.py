@@ -10,7 +10,6 @@ from ringsim.core.library import call
 from ringsim.frame.integrate import Integration
 from ringsim.frame.mesh import tetrahedron
 from ringsim.frame.model import FrameModel
-from ringsim.frame.state import move, place_points
 from ringsim.scene import load_scene
 
 pytestmark = pytest.mark.quick
@@ -75,9 +74,9 @@ def _turning_energy(model: FrameModel, turn: np.ndarray) -> float:
             turned = place + math.sin(angle) * np.cross(axis, place)
             turned += (1.0 - math.cos(angle)) * np.cross(axis, np.cross(axis, place))
             by[k : k + 3], by[k + 3 : k + 6] = turned - place, sign * small * turn
-        move(model.mesh, state.pose, by)
+        call("move", model.mesh, state.pose, by)
         places = np.empty((len(model.mesh.point_mass), 3))
-        place_points(model.mesh, state.pose, places)
+        call("place_points", model.mesh, state.pose, places)
         sides.append(places)
     none = np.zeros((len(model.mesh.length), 6))
     found = np.zeros(2)

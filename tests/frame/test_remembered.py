@@ -22,7 +22,7 @@ from ringsim.core.chain import Seen
 from ringsim.dataset import save
 from ringsim.frame.integrate import Storing
 from ringsim.frame.model import FrameModel
-from ringsim.frame.readings import EnergyMeter, Readings
+from ringsim.frame.readings import EnergyMeter, FrameMeters
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
 from ringsim.stepping.repeats import Indicator
@@ -80,7 +80,7 @@ def inside(thing: Any) -> dict[Any, Any] | None:
     if isinstance(thing, EnergyMeter):
         # Rooms are written before they are read.
         own = {name: one for name, one in own.items() if name != "_rooms"}
-    if isinstance(thing, Readings):
+    if isinstance(thing, FrameMeters):
         # They look at a state when it is read.
         own = {name: one for name, one in own.items() if name not in ("now", "_state")}
     return own

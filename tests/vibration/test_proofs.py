@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from beams import squares
+from ringsim.core.library import call
 from ringsim.exudyn.build import build
-from ringsim.frame.modes import PARTS, Standing
-from ringsim.frame.state import move
+from ringsim.frame.modes import ENERGY_PARTS, Standing
 from ringsim.layout.layout import layout_of
 from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, load_scene
@@ -51,7 +51,8 @@ def of_boom(elements: int) -> Any:
     """The three lowest frequencies of a boom by itself, each in both directions, Hz."""
     scene = ring(4, **{k.replace(".", "__"): v for k, v in BOOM.items()}, boom__elements=elements)
     found = Standing(scene, 90.0, latched=True).modes(30)
-    return hertz(found.squares[found.shares[:, PARTS.index("boom")] > 0.99][:6]).reshape(3, 2)
+    booms = found.shares[:, ENERGY_PARTS.index("boom")] > 0.99
+    return hertz(found.squares[booms][:6]).reshape(3, 2)
 
 
 def test_a_boom_alone_is_a_cantilever_in_closed_form_with_order_two() -> None:
@@ -147,7 +148,8 @@ def rayleigh(standing: Standing, vector: Any) -> float:
     forces = []
     for way in (by, -by):
         standing.state.recall(start.memory())
-        move(standing.model.mesh, standing.state.pose, way * vector[: standing.model.mesh.unknowns])
+        mesh = standing.model.mesh
+        call("move", mesh, standing.state.pose, way * vector[: mesh.unknowns])
         standing.state.hub += way * vector[-3:] if standing.model.with_hub else 0.0
         forces.append(standing.unbalance().copy())
     standing.state.recall(start.memory())
@@ -187,9 +189,9 @@ def test_shapes_have_the_frequency_of_their_forces(
 def test_energy_of_a_shape_is_that_of_its_strains() -> None:
     """Without net, ropes and weight nothing else stores any: shares of the parts sum to one."""
     found = Standing(ring(6), 180.0, latched=True).modes(8)
-    assert np.abs(found.shares[:, PARTS.index("net, ropes and weight")]).max() < 1e-5
+    assert np.abs(found.shares[:, ENERGY_PARTS.index("net, ropes and weight")]).max() < 1e-5
     assert found.shares.sum(axis=1) == pytest.approx(np.ones(8), abs=1e-12)
-    assert found.shares[:, PARTS.index("V-joints")].max() > 0.01
+    assert found.shares[:, ENERGY_PARTS.index("V-joints")].max() > 0.01
 
 
 def test_effective_masses_of_a_shaken_ring_sum_to_its_moving_mass() -> None:

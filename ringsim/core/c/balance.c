@@ -17,12 +17,12 @@ static void follow(const Coefficients *with, D step, const Followed *start, cons
 }
 
 /* Places of all followed coordinates at a pose, and arms of the cables' points. */
-void put_in_place(const Mesh *mesh, const Lines *lines, const Held *held, const Pose *pose,
+void put_in_place(const Mesh *mesh, const PathPoints *paths, const Held *held, const Pose *pose,
                   const D *hub, I n_hub, const Arms *arms, D *place, I n_place) {
     (void)n_hub, (void)n_place;
     const I *cuts = held->cuts.at;
     place_points(mesh, pose, place + cuts[POINTS], 0);
-    place_lines(lines, pose, arms, place + cuts[LINES]);
+    place_paths(paths, pose, arms, place + cuts[PATHS]);
     memcpy(place + cuts[ANGLES], pose->angle.at, (size_t)pose->angle.n * sizeof(D));
     for (I n = 0; n < held->ends.n; n++)
         store_vector(place + cuts[ENDS] + 3 * n, place_of(pose, held->ends.at[n]));
@@ -231,14 +231,14 @@ static const D *inertial(const Held *held, const Followed *now, I points, D *roo
 
 /* Follow a pose over a step, and add forces of rods, masses, slides, joints and strings to the
    residual of all so many unknowns; returns whether a string pulls.  loads keep what elements hold. */
-bool balance(const Mesh *mesh, const Lines *lines, const Held *held, const Acting *joints,
+bool balance(const Mesh *mesh, const PathPoints *paths, const Held *held, const Acting *joints,
              const Web *web, const Coefficients *coefficients, D step, const Followed *start,
              const Pose *pose, const D *hub, const Arms *arms, const Followed *now,
              const Strains *strains, D *loads, D *g, I size) {
     const I *cuts = held->cuts.at;
     I points = mesh->point_mass.n;
     D room[3 * points + 1];
-    put_in_place(mesh, lines, held, pose, hub, 0, arms, now->place.at, 0);
+    put_in_place(mesh, paths, held, pose, hub, 0, arms, now->place.at, 0);
     follow(coefficients, step, start, now);
     add_forces(mesh, pose, now->place.at + cuts[POINTS], 0, inertial(held, now, points, room), 0,
                strains, loads, 0, g, 0);

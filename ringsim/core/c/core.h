@@ -169,14 +169,14 @@ typedef struct {
 } Followed;
 
 /* Where groups of followed coordinates begin. */
-enum { POINTS, LINES, ANGLES, ENDS, HUB, HUNG };
+enum { POINTS, PATHS, ANGLES, ENDS, HUB, HUNG };
 
 typedef struct {
     Pose pose;
     Reals hub;
     Followed followed;
     Strains strains;
-} State;
+} Moving;
 
 typedef struct {
     Ints cuts, ends, hung, top, low;
@@ -194,7 +194,7 @@ typedef struct {
     Ints angle;
     Reals share;
     Ints span, near, front, local;
-} Lines;
+} PathPoints;
 
 typedef struct {
     Reals whole, swung, axis;
@@ -204,13 +204,13 @@ typedef struct {
     Tape decays, slopes;
     I moves, loads, most;
     D least_tension, solved;
-} Laws;
+} PulleyLaws;
 
 /* ringsim.core.tension */
 typedef struct {
     Ints starts, ends, near, pulley, felt;
     Reals content, alive, material, slip_speed;
-} Ropes;
+} RopeTable;
 
 typedef struct {
     Reals natural, winding, inflow;
@@ -222,7 +222,7 @@ typedef struct {
 
 /* ringsim.frame.cables.Roped */
 typedef struct {
-    Ropes ropes;
+    RopeTable ropes;
     Ints behind;
     Drums drums;
     Spans spans;
@@ -234,13 +234,13 @@ typedef struct {
 /* ringsim.frame.model.System */
 typedef struct {
     Mesh mesh;
-    Lines lines;
+    PathPoints paths;
     Held held;
     Acting joints;
     Seen rubbing;
     Web web;
     Coefficients with;
-    Laws laws;
+    PulleyLaws laws;
     Arms arms;
     Fronts fronts;
     Reals loads, kept, lengths, weights, g, changes, reaction;
@@ -274,7 +274,7 @@ void add_forces(const Mesh *mesh, const Pose *pose, const D *points, I n_points,
 void begin_tangent(const Mesh *mesh, const Pose *pose, const D *points, I n_points,
                    const D *accelerations, I n_accelerations, const D *loads, I n_loads, D lead,
                    D by_place, const Fronts *fronts);
-void place_lines(const Lines *lines, const Pose *pose, const Arms *arms, D *out);
+void place_paths(const PathPoints *paths, const Pose *pose, const Arms *arms, D *out);
 void push_joints(const Acting *acting, const D *angles, const D *rates, const Mesh *mesh, D *g);
 void add_joint_slopes(const Acting *acting, const D *angles, const D *rates, D by_rate,
                       const Mesh *mesh, const Fronts *fronts);
@@ -286,7 +286,7 @@ D passing_pairs(const Web *web, const Held *held, const Followed *now, D *lost, 
 D slid_apart(const Held *held, const Pose *pose, I n);
 void energies_of(const Mesh *mesh, const D *velocities, I n_velocities, const D *strains,
                  I n_strains, D *out, I n_out);
-bool balance(const Mesh *mesh, const Lines *lines, const Held *held, const Acting *joints,
+bool balance(const Mesh *mesh, const PathPoints *paths, const Held *held, const Acting *joints,
              const Web *web, const Coefficients *coefficients, D step, const Followed *start,
              const Pose *pose, const D *hub, const Arms *arms, const Followed *now,
              const Strains *strains, D *loads, D *g, I size);
@@ -294,11 +294,11 @@ void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, con
                    const Pose *pose, const Followed *now, const D *loads, D lead, D by_rate,
                    D by_place, bool strung, const Fronts *fronts, D *columns, D *rows, D *corner,
                    I wide);
-D measure(const Ropes *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
+D measure(const RopeTable *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
           I n_rates, const Spans *spans);
-Place place_behind(const Ropes *ropes, I rope, Place before);
+Place place_behind(const RopeTable *ropes, I rope, Place before);
 D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g);
-I find_slopes(const Roped *roped, const Laws *laws);
+I find_slopes(const Roped *roped, const PulleyLaws *laws);
 void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,
                 I wide, I first);
 void move(const Mesh *mesh, const Pose *pose, const D *step, I n_step);

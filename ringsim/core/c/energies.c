@@ -37,7 +37,7 @@ static D lost_between(const D *before, const D *after, I n, D step) {
 
 /* Read a state: what takes energy there, shape (3, n), and what is told of it.  Kept is the same of
    the state so long before, or empty. */
-void read_energies(const System *system, const State *now, D step, D *passing, I n_passing, const D *kept, I n_kept, D *told, I n_told) {
+void read_energies(const System *system, const Moving *now, D step, D *passing, I n_passing, const D *kept, I n_kept, D *told, I n_told) {
     (void)n_told;
     const Mesh *mesh = &system->mesh;
     const Held *held = &system->held;
@@ -84,7 +84,7 @@ void read_energies(const System *system, const State *now, D step, D *passing, I
 
 /* Two rows of a chain: works (J) from one to the other, put in by the winches less what is wound up,
    and lost; see ringsim.core.chain.work_between. */
-void work_of_ropes(const Ropes *ropes, const I *behind, I pulleys, const D *before, I n_before,
+void work_of_ropes(const RopeTable *ropes, const I *behind, I pulleys, const D *before, I n_before,
                    const D *after, I n_after, D *out, I n_out) {
     (void)n_before, (void)n_after, (void)n_out;
     I count = ropes->starts.n, n = ropes->near.n, forces = 7 * n + 4 * pulleys, held = forces + pulleys;

@@ -37,8 +37,8 @@ static D weighted(const D *weights, const D *a, const D *b, I n) {
 }
 
 /* Forces out of balance on all unknowns, into system->g. */
-I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, const State *start,
-            const State *now) {
+I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, const Moving *start,
+            const Moving *now) {
     const Mesh *mesh = &system->mesh;
     const I *cuts = system->held.cuts.at;
     const D *rates = now->followed.rate.at;
@@ -46,14 +46,14 @@ I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, c
     I size = system->g.n;
     for (I k = 0; k < size; k++) g[k] = -system->loads.at[k];
     roped->border.used.at[STRUNG] =
-        balance(mesh, &system->lines, &system->held, &system->joints, &system->web, &system->with,
+        balance(mesh, &system->paths, &system->held, &system->joints, &system->web, &system->with,
                 step, &start->followed, &now->pose, now->hub.at, &system->arms, &now->followed,
                 &now->strains, system->kept.at, g, size);
     note_joints(&system->joints, &system->rubbing, rates + cuts[ANGLES]);
     if (asks & PARTS && ask(FORCES)) return RAISED;
     if (roped->ropes.starts.n > 0) {
-        const D *places = now->followed.place.at + cuts[LINES];
-        rates += cuts[LINES];
+        const D *places = now->followed.place.at + cuts[PATHS];
+        rates += cuts[PATHS];
         if (asks & WINCHES) {
             measure(&roped->ropes, roped->behind.at, roped->behind.n, places, 0, rates, 0, &roped->spans);
             if (ask(WIND)) return RAISED;
@@ -77,12 +77,13 @@ I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, c
 
    K is in the fronts; z are the changes of tension in all ropes and, where a net's strings pull, the
    places of its hub. */
-I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, const State *now) {
+I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, const Moving *now) {
     const Mesh *mesh = &system->mesh;
     const Border *border = &roped->border;
     const Coefficients *with = &system->with;
     const I *cuts = system->held.cuts.at;
     const D *rates = now->followed.rate.at;
+    /* As Coefficients in ringsim.frame.state, which tells parts of Python's the same. */
     D by_rate = with->gamma / (with->beta * step);
     D by_place = (1.0 - with->alpha_m) / ((1.0 - with->alpha_f) * with->beta * step * step);
     I strung = border->used.at[STRUNG], factors = 0;
@@ -104,7 +105,7 @@ I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, con
                    by_rate, mesh, &system->fronts);
     if (asks & PARTS && ask(SLOPES)) return RAISED;
     if (roped->ropes.starts.n > 0)
-        add_cables(system, roped, rates + cuts[LINES], by_rate, factors, wide, 3 * strung);
+        add_cables(system, roped, rates + cuts[PATHS], by_rate, factors, wide, 3 * strung);
     if (!factor(mesh, &system->fronts)) return PIVOT;
     return wide == 0 || close_border(mesh, &system->fronts, border, wide) ? BALANCED : PIVOT;
 }
@@ -154,8 +155,8 @@ void learn(const D *weights, I n, D *changes, I n_changes, D *squares, I n_squar
    Changes are taken whole.  Where forces bend sharply, as of stops and of dry friction that turns
    round, the residual may grow for an iteration: what it finds there is what tells the way back
    (turning.c), and shorter changes would only find it later. */
-I balance_step(const System *system, const Roped *roped, I asks, Ask ask, D step, const State *start,
-               const State *now, D tolerance, D *told, I n_told) {
+I balance_step(const System *system, const Roped *roped, I asks, Ask ask, D step, const Moving *start,
+               const Moving *now, D tolerance, D *told, I n_told) {
     (void)n_told;
     I size = system->g.n, unknowns = system->mesh.unknowns, made = 0;
     const D *lengths = system->lengths.at;

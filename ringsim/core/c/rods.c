@@ -112,8 +112,8 @@ static void carry(Load *own, Vec4 force, Vec4 moment) {
                    times4(e, cross4(own->w, turn4(&own->middle, psi))));
 }
 
-/* Add forces of elastic rods and of inertia on all unknowns; keeps strains, and what elements hold.
-   Places and accelerations are those of all points. */
+/* Add forces of elastic rods and of inertia on all unknowns; keeps strains, and what elements hold in
+   loads (room_for_loads).  Places and accelerations are those of all points, (p, 3). */
 void add_forces(const Mesh *mesh, const Pose *pose, const D *points, I n_points,
                 const D *accelerations, I n_accelerations, const Strains *strains, D *loads,
                 I n_loads, D *g, I n_g) {
@@ -362,6 +362,7 @@ void begin_tangent(const Mesh *mesh, const Pose *pose, const D *points, I n_poin
 
 /* Poses: how they move. */
 
+/* Places of all points with mass, (p, 3). */
 void place_points(const Mesh *mesh, const Pose *pose, D *out, I n_out) {
     (void)n_out;
     for (I n = 0; n < mesh->point_frame.n; n++) {
@@ -372,7 +373,7 @@ void place_points(const Mesh *mesh, const Pose *pose, D *out, I n_out) {
     }
 }
 
-/* Move a pose by changes of all unknowns. */
+/* Move a pose by changes of all unknowns, in place. */
 void move(const Mesh *mesh, const Pose *pose, const D *step, I n_step) {
     (void)n_step;
     for (I f = 0; f < pose->place.n; f++) {
@@ -412,7 +413,7 @@ void straighten(const Pose *pose) {
 /* A step: how it begins from a state, and what it has led to. */
 
 /* Begin at the start, moved by changes of all unknowns, the hub's last. */
-void set_out(const Mesh *mesh, const State *start, const State *now, const D *by, I n_by) {
+void set_out(const Mesh *mesh, const Moving *start, const Moving *now, const D *by, I n_by) {
     const Pose *from = &start->pose, *pose = &now->pose;
     memcpy(pose->place.at, from->place.at, (size_t)(3 * pose->place.n) * sizeof(D));
     memcpy(pose->axes.at, from->axes.at, (size_t)(9 * pose->axes.n) * sizeof(D));
@@ -423,7 +424,7 @@ void set_out(const Mesh *mesh, const State *start, const State *now, const D *by
 }
 
 /* Straighten the axes that a step has led to; changes of all unknowns over it, before that. */
-void arrive(const Mesh *mesh, const State *start, const State *now, D *out, I n_out) {
+void arrive(const Mesh *mesh, const Moving *start, const Moving *now, D *out, I n_out) {
     moved_between(mesh, &start->pose, &now->pose, out);
     for (I k = mesh->unknowns; k < n_out; k++) {
         I own = k - mesh->unknowns;

@@ -8,7 +8,7 @@ static const D STRAIGHT = 1e-7;
 
 /* Lengths, rates, directions and angles of places and rates of the points; returns the least
    length, m. */
-D measure(const Ropes *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
+D measure(const RopeTable *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
           I n_rates, const Spans *spans) {
     (void)n_places, (void)n_rates;
     D least = INFINITY;
@@ -35,7 +35,7 @@ typedef struct {
     D length, rate;
 } Path;
 
-static Path path_of(const Ropes *ropes, const Spans *spans, I rope) {
+static Path path_of(const RopeTable *ropes, const Spans *spans, I rope) {
     Path found = {0.0, 0.0};
     for (I i = ropes->starts.at[rope]; i < ropes->ends.at[rope]; i++) {
         found.length += spans->length.at[i];
@@ -45,7 +45,7 @@ static Path path_of(const Ropes *ropes, const Spans *spans, I rope) {
 }
 
 /* Of the rope behind another one, whose place this is; of the first one behind {-1}. */
-Place place_behind(const Ropes *ropes, I rope, Place before) {
+Place place_behind(const RopeTable *ropes, I rope, Place before) {
     const I *near = ropes->near.at, first = ropes->starts.at[rope], behind = ropes->ends.at[rope];
     bool begins = first == 0 || near[first] != near[first - 1] + 1;
     bool ends = behind == ropes->near.n || near[behind] != near[behind - 1] + 1;
@@ -53,7 +53,7 @@ Place place_behind(const Ropes *ropes, I rope, Place before) {
 }
 
 /* Let the winches at both ends of each cable have wound so much (m), at rates (m/s). */
-void wind(const Ropes *ropes, const D *wound, I n_wound, const D *rates, I n_rates, const Drums *drums) {
+void wind(const RopeTable *ropes, const D *wound, I n_wound, const D *rates, I n_rates, const Drums *drums) {
     (void)n_wound, (void)n_rates;
     Place place = {-1, false, false};
     for (I rope = 0; rope < ropes->starts.n; rope++) {
@@ -68,7 +68,7 @@ void wind(const Ropes *ropes, const D *wound, I n_wound, const D *rates, I n_rat
 }
 
 /* Speeds of the ropes over the pulleys, and exponents of their friction. */
-void slide(const Ropes *ropes, const Drums *drums, const Spans *spans) {
+void slide(const RopeTable *ropes, const Drums *drums, const Spans *spans) {
     for (I rope = 0; rope < ropes->starts.n; rope++) {
         Path path = path_of(ropes, spans, rope);
         D natural = drums->natural.at[rope], beyond = path.length, rate_beyond = path.rate;
@@ -90,7 +90,7 @@ void slide(const Ropes *ropes, const Drums *drums, const Spans *spans) {
 }
 
 /* Elastic and viscous force of a rope before slack. */
-static D force_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
+static D force_of(const RopeTable *ropes, const Drums *drums, I rope, Path path) {
     const D *material = ropes->material.at + 3 * rope;
     D natural = drums->natural.at[rope], ratio = path.length / natural;
     D strain_rate = (path.rate + ratio * drums->winding.at[rope]) / natural;
@@ -98,17 +98,18 @@ static D force_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
     return stretch * material[0];
 }
 
-/* Tension of a force, slack within a width, without compression. */
+/* Tension of a force, slack within a width, without compression; ringsim.cable.winches has the same
+   where winches answer to it. */
 static D smooth(D force, D width) {
     return larger(force, 0.0) + width * log1p(exp(larger(-fabs(force) / width, -200.0)));
 }
 
-static D tension_of(const Ropes *ropes, const Drums *drums, I rope, Path path) {
+static D tension_of(const RopeTable *ropes, const Drums *drums, I rope, Path path) {
     return smooth(force_of(ropes, drums, rope, path), ropes->material.at[3 * rope + 2]);
 }
 
 /* Tensions of all spans, whose speeds are known. */
-void tighten(const Ropes *ropes, const Drums *drums, const D *log_decays, I pulleys,
+void tighten(const RopeTable *ropes, const Drums *drums, const D *log_decays, I pulleys,
              const Spans *spans) {
     (void)pulleys;
     D *share = spans->share.at;
@@ -159,8 +160,8 @@ static D *append(D *to, const D *from, I n) {
     return to + n;
 }
 
-/* What a chain tells whose spans are known, one behind the other (ringsim.cable.ropes.PARTS). */
-void read_chain(const Ropes *ropes, const I *behind, I pulleys, const Drums *drums, const Spans *spans,
+/* What a chain tells whose spans are known, one behind the other (ringsim.cable.ropes.CHAIN_PARTS). */
+void read_chain(const RopeTable *ropes, const I *behind, I pulleys, const Drums *drums, const Spans *spans,
                 const D *log_decays, I n_log_decays, const D *wound, I n_wound, const D *wound_rate,
                 I n_wound_rate, D *out, I n_out) {
     (void)n_log_decays, (void)n_out;
@@ -196,7 +197,7 @@ void read_chain(const Ropes *ropes, const I *behind, I pulleys, const Drums *dru
 }
 
 /* Let laws see the pulleys (ringsim.cable.friction.Pulleys). */
-static void show(const I *behind, I pulleys, const Spans *spans, const Laws *laws, const Tape *tape) {
+static void show(const I *behind, I pulleys, const Spans *spans, const PulleyLaws *laws, const Tape *tape) {
     D *angle = row_of(tape, 0), *speed = row_of(tape, 1), *tension = row_of(tape, 2);
     for (I j = 0; j < pulleys; j++) {
         D both = 0.5 * (spans->tension.at[behind[j] - 1] + spans->tension.at[behind[j]]);
@@ -210,7 +211,7 @@ enum { DECAY = 3, BY_ANGLE = 3, BY_SPEED };
 
 /* Spans, with their tensions, at places and rates of the points; returns the least length, NaN if no
    tensions go with the friction. */
-D pull_tight(const Ropes *ropes, const I *behind, I pulleys, const Drums *drums, const Laws *laws,
+D pull_tight(const RopeTable *ropes, const I *behind, I pulleys, const Drums *drums, const PulleyLaws *laws,
              const D *places, I n_places, const D *rates, I n_rates, const Spans *spans) {
     D least = measure(ropes, behind, pulleys, places, n_places, rates, n_rates, spans);
     D *decays = row_of(&laws->decays, DECAY), before[pulleys + 1];
@@ -240,12 +241,12 @@ D pull_tight(const Ropes *ropes, const I *behind, I pulleys, const Drums *drums,
 }
 
 /* Whether the friction of the pulley before a span changes with speed. */
-static bool turns(const Ropes *ropes, const D *slopes, I span) {
+static bool turns(const RopeTable *ropes, const D *slopes, I span) {
     return ropes->pulley.at[span] >= 0 && slopes[ropes->pulley.at[span]] != 0.0;
 }
 
-/* Number of factors that tension_changes finds. */
-I factors_needed(const Ropes *ropes, const D *slopes, I pulleys) {
+/* Number of factors that tension_changes finds with these slopes (s/m). */
+I factors_needed(const RopeTable *ropes, const D *slopes, I pulleys) {
     (void)pulleys;
     I count = 0;
     for (I rope = 0; rope < ropes->starts.n; rope++) {
@@ -273,8 +274,8 @@ D limit_of_ropes(I number) { return number == 0 ? SHORTEST : PASSING; }
 
 /* Slopes (s/m) of the pulleys' exponents after the ropes' speeds, with those of laws of speed, as far
    as tangents need them; plays the laws' derivatives.  Returns the number of factors. */
-I find_slopes(const Roped *roped, const Laws *laws) {
-    const Ropes *ropes = &roped->ropes;
+I find_slopes(const Roped *roped, const PulleyLaws *laws) {
+    const RopeTable *ropes = &roped->ropes;
     const Spans *spans = &roped->spans;
     I pulleys = roped->behind.n;
     D *slopes = roped->slopes.at;
@@ -331,10 +332,18 @@ static void by_angle(const Rope *rope, D slope, D tail, I first, I b, const Span
     add_vector(longer + 3 * (b - first), times(-tail / rope->path, back));
 }
 
-/* Changes of tension in factors: tensions of the spans, shape (k, spans), and what they change with,
-   after the differences of the points, (k, spans, 3); both zeros before.  See
-   ringsim.core.tension.tension_changes. */
-void tension_changes(const Ropes *ropes, const Drums *drums, const D *log_decays, I n_decays,
+/* Changes of tension in k factors: tensions of the spans (N), shape (k, spans), and what they change
+   with, after the differences of the points, (k, spans, 3); both zeros before.
+
+   Derivatives after places are taken by_place times, those after rates by_rate times.  The first
+   factor of a rope is that of its mean tension, with the share left of its stiffness that its winches
+   do not answer.  log_slopes are the derivatives of log_decays after the angles, 1/rad, slopes those
+   of the exponents after the rope's speed, s/m.
+
+   A pulley's friction changes all spans behind it, less their share of the path.  Pulleys between
+   which no span is felt change the same ones, and have one factor; their shares of the path go to the
+   last factor of the rope. */
+void tension_changes(const RopeTable *ropes, const Drums *drums, const D *log_decays, I n_decays,
                      const D *log_slopes, I n_log_slopes, const D *slopes, I n_slopes,
                      const Spans *spans, const D *velocities, I n_velocities, const D *left, I n_left,
                      D by_place, D by_rate, D *pulls, I n_pulls, D *changes, I n_changes) {
@@ -403,16 +412,16 @@ void tension_changes(const Ropes *ropes, const Drums *drums, const D *log_decays
 /* The cables on frames. */
 
 /* Arms and places of all points of the paths. */
-void place_lines(const Lines *lines, const Pose *pose, const Arms *arms, D *out) {
-    for (I n = 0; n < lines->frame.n; n++) {
-        I frame = lines->frame.at[n], angle = lines->angle.at[n];
+void place_paths(const PathPoints *paths, const Pose *pose, const Arms *arms, D *out) {
+    for (I n = 0; n < paths->frame.n; n++) {
+        I frame = paths->frame.at[n], angle = paths->angle.at[n];
         Mat axes = axes_of(pose, frame);
-        Vec arm = turn(&axes, vector(lines->arm.at + 3 * n)), swung = {0}, axis = {0};
+        Vec arm = turn(&axes, vector(paths->arm.at + 3 * n)), swung = {0}, axis = {0};
         if (angle >= 0) {
-            Mat drawn = matrix(lines->axes.at + 9 * n), own = mul(&axes, &drawn);
-            Mat by = turned_about_z(lines->share.at[n] * pose->angle.at[angle]);
-            swung = turn(&own, turn(&by, vector(lines->swung.at + 3 * n)));
-            axis = times(lines->share.at[n], (Vec){own.a[2], own.a[5], own.a[8]});
+            Mat drawn = matrix(paths->axes.at + 9 * n), own = mul(&axes, &drawn);
+            Mat by = turned_about_z(paths->share.at[n] * pose->angle.at[angle]);
+            swung = turn(&own, turn(&by, vector(paths->swung.at + 3 * n)));
+            axis = times(paths->share.at[n], (Vec){own.a[2], own.a[5], own.a[8]});
         }
         arm = plus(arm, swung);
         store_vector(arms->whole.at + 3 * n, arm);
@@ -424,19 +433,19 @@ void place_lines(const Lines *lines, const Pose *pose, const Arms *arms, D *out)
 
 /* Add what forces on all points, shape (count, points, 3), do to the unknowns, (unknowns, columns),
    from the first column on. */
-static void pull_lines(const Lines *lines, const Mesh *mesh, const Arms *arms, const D *forces,
+static void pull_paths(const PathPoints *paths, const Mesh *mesh, const Arms *arms, const D *forces,
                        I count, D *out, I columns, I first) {
-    I points = lines->frame.n;
+    I points = paths->frame.n;
     for (I n = 0; n < points; n++) {
-        D *to = out + mesh->home.at[lines->frame.at[n]] * columns + first;
+        D *to = out + mesh->home.at[paths->frame.at[n]] * columns + first;
         Vec arm = vector(arms->whole.at + 3 * n);
         Vec by_turn = cross(vector(arms->axis.at + 3 * n), vector(arms->swung.at + 3 * n));
         for (I c = 0; c < count; c++) {
             Vec force = vector(forces + 3 * (c * points + n)), moment = cross(arm, force);
             to[c] += force.x, to[columns + c] += force.y, to[2 * columns + c] += force.z;
             to[3 * columns + c] += moment.x, to[4 * columns + c] += moment.y, to[5 * columns + c] += moment.z;
-            if (lines->angle.at[n] >= 0)
-                out[mesh->angle_home.at[lines->angle.at[n]] * columns + first + c] += dot(by_turn, force);
+            if (paths->angle.at[n] >= 0)
+                out[mesh->angle_home.at[paths->angle.at[n]] * columns + first + c] += dot(by_turn, force);
         }
     }
 }
@@ -445,18 +454,18 @@ static void pull_lines(const Lines *lines, const Mesh *mesh, const Arms *arms, c
    between frames to the residual; returns the least length of a span, m. */
 D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g) {
     const Mesh *mesh = &system->mesh;
-    const Lines *lines = &system->lines;
+    const PathPoints *paths = &system->paths;
     const Arms *arms = &system->arms;
     const Spans *spans = &roped->spans;
     D least = pull_tight(&roped->ropes, roped->behind.at, roped->behind.n, &roped->drums,
                          &system->laws, places, 0, rates, 0, spans);
-    for (I s = 0; s < lines->span.n; s++) {
-        I span = lines->span.at[s];
+    for (I s = 0; s < paths->span.n; s++) {
+        I span = paths->span.at[s];
         Vec force = times(spans->tension.at[span], vector(spans->unit.at + 3 * span));
         for (int side = 0; side < 2; side++) {
-            I n = lines->near.at[s] + side, angle = lines->angle.at[n];
+            I n = paths->near.at[s] + side, angle = paths->angle.at[n];
             Vec pull = side ? force : times(-1.0, force);
-            push(g + mesh->home.at[lines->frame.at[n]], pull, cross(vector(arms->whole.at + 3 * n), pull));
+            push(g + mesh->home.at[paths->frame.at[n]], pull, cross(vector(arms->whole.at + 3 * n), pull));
             if (angle >= 0)
                 g[mesh->angle_home.at[angle]] +=
                     dot(vector(arms->axis.at + 3 * n), cross(vector(arms->swung.at + 3 * n), pull));
@@ -469,12 +478,12 @@ enum { SIDE = 7, BOTH_SIDES = 14 };
 
 /* How the points at the ends of a span move with its unknowns, and what arms that turn under its
    constant pull add to the front. */
-static void turn_arms(const Lines *lines, const Arms *arms, const Spans *spans, I s, D *front,
+static void turn_arms(const PathPoints *paths, const Arms *arms, const Spans *spans, I s, D *front,
                       I columns, D legs[3][BOTH_SIDES]) {
-    I span = lines->span.at[s];
-    const I *local = lines->local.at + BOTH_SIDES * s;
+    I span = paths->span.at[s];
+    const I *local = paths->local.at + BOTH_SIDES * s;
     for (int side = 0; side < 2; side++) {
-        I n = lines->near.at[s] + side;
+        I n = paths->near.at[s] + side;
         int own = SIDE * side;
         D sign = 2.0 * side - 1.0;
         Vec arm = vector(arms->whole.at + 3 * n), swung = vector(arms->swung.at + 3 * n),
@@ -509,15 +518,15 @@ static void turn_arms(const Lines *lines, const Arms *arms, const Spans *spans, 
 }
 
 /* Add how the pulls of spans between frames turn with the spans and the arms to the fronts. */
-static void add_line_tangent(const Lines *lines, const Arms *arms, const Spans *spans,
+static void add_span_tangent(const PathPoints *paths, const Arms *arms, const Spans *spans,
                              const Fronts *fronts) {
     D legs[3][BOTH_SIDES], pulled[3][BOTH_SIDES];
     I columns = fronts->columns;
-    for (I s = 0; s < lines->span.n; s++) {
-        I span = lines->span.at[s];
-        const I *local = lines->local.at + BOTH_SIDES * s;
-        D *front = front_of(fronts, lines->front.at[s]);
-        turn_arms(lines, arms, spans, s, front, columns, legs);
+    for (I s = 0; s < paths->span.n; s++) {
+        I span = paths->span.at[s];
+        const I *local = paths->local.at + BOTH_SIDES * s;
+        D *front = front_of(fronts, paths->front.at[s]);
+        turn_arms(paths, arms, spans, s, front, columns, legs);
         /* T (1 - u u^T) / L: the tension turns with the span. */
         Vec unit = vector(spans->unit.at + 3 * span);
         D stiffness = spans->tension.at[span] / spans->length.at[span];
@@ -539,7 +548,7 @@ static void add_line_tangent(const Lines *lines, const Arms *arms, const Spans *
 
 /* Changes of tension in factors as pulls on all points, and what they change with after places of
    all points, (2, count, points, 3), from those of spans. */
-void spread_changes(const Ropes *ropes, const Spans *spans, const D *pulls, I n_pulls,
+void spread_changes(const RopeTable *ropes, const Spans *spans, const D *pulls, I n_pulls,
                     const D *changes, I n_changes, D *out, I n_out) {
     (void)n_changes;
     I n = spans->length.n, count = n ? n_pulls / n : 0, half = n_out / 2, points = count ? half / (3 * count) : 0;
@@ -561,12 +570,12 @@ void spread_changes(const Ropes *ropes, const Spans *spans, const D *pulls, I n_
 void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,
                 I wide, I first) {
     const Mesh *mesh = &system->mesh;
-    const Lines *lines = &system->lines;
+    const PathPoints *paths = &system->paths;
     const Arms *arms = &system->arms;
-    const Laws *laws = &system->laws;
-    const Ropes *ropes = &roped->ropes;
+    const PulleyLaws *laws = &system->laws;
+    const RopeTable *ropes = &roped->ropes;
     const Spans *spans = &roped->spans;
-    I n = spans->length.n, all_points = 3 * count * lines->frame.n;
+    I n = spans->length.n, all_points = 3 * count * paths->frame.n;
     /* Room of the table: a long ring's would be too large for a stack. */
     D *pulls = roped->pulls.at, *changes = roped->changes.at, *factors = roped->factors.at;
     memset(pulls, 0, (size_t)(count * n) * sizeof(D));
@@ -576,7 +585,7 @@ void add_cables(const System *system, const Roped *roped, const D *rates, D rate
                     row_of(&laws->slopes, BY_ANGLE), 0, roped->slopes.at, 0, spans, rates, 0,
                     roped->left.at, 0, 1.0, rate_by_place, pulls, 0, changes, 0);
     spread_changes(ropes, spans, pulls, count * n, changes, 0, factors, 2 * all_points);
-    add_line_tangent(lines, arms, spans, &system->fronts);
-    pull_lines(lines, mesh, arms, factors, count, roped->border.columns.at, wide, first);
-    pull_lines(lines, mesh, arms, factors + all_points, count, roped->border.rows.at, wide, first);
+    add_span_tangent(paths, arms, spans, &system->fronts);
+    pull_paths(paths, mesh, arms, factors, count, roped->border.columns.at, wide, first);
+    pull_paths(paths, mesh, arms, factors + all_points, count, roped->border.rows.at, wide, first);
 }

@@ -84,7 +84,7 @@ const char *compiled_from(void) { return SOURCES; }
 I words_of_table(I number) {
     const I words[] = {WORDS(Mesh), WORDS(Pose), WORDS(Strains), WORDS(Fronts), WORDS(Border),
                        WORDS(Tape), WORDS(Acting), WORDS(Web), WORDS(Coefficients), WORDS(Followed),
-                       WORDS(State), WORDS(Held), WORDS(Lines), WORDS(Arms), WORDS(Laws), WORDS(Ropes),
+                       WORDS(Moving), WORDS(Held), WORDS(PathPoints), WORDS(Arms), WORDS(PulleyLaws), WORDS(RopeTable),
                        WORDS(Drums), WORDS(Spans), WORDS(Seen), WORDS(Roped), WORDS(System)};
     return words[number];
 }

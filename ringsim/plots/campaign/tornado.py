@@ -351,8 +351,7 @@ _LEAST_SPAN = 0.02
 
 def is_one_by_one(campaign: xr.Dataset) -> bool:
     """Whether inputs were moved one at a time, and something came of it."""
-    kind = placement(campaign).kind
-    return kind == "one-at-a-time" and bool(scalars(campaign)) and bool(inputs(campaign))
+    return one_at_a_time(campaign) and bool(scalars(campaign)) and bool(inputs(campaign))
 
 
 def _scaled(campaign: xr.Dataset, name: str, samples: NDArray[np.int64]) -> bool:
