@@ -256,12 +256,26 @@ def _summary(scene: Scene) -> dict[str, str]:
             label: text for name, part in parts.items() if part is not None
             for label, text in _described(name, part.model_dump()).items()
         },
+        "winches": _stalls(scene),
         "faults": "; ".join(map(_fields, scene.faults)),
         "friction": ", ".join(friction),
         "left out": ", ".join(name for name, out in absent.items() if out).replace("_", " ")
         or "nothing",
         "solver": _fields(scene.solver),
     }  # fmt: skip
+
+
+def _stalls(scene: Scene) -> str:
+    """The tension at which each winch stalls, after its losses; empty if none ever does."""
+    found = dict[str, list[str]]()
+    for plane, cable in [] if scene.cables is None else scene.cables.present():
+        winches = {"winch": cable.winch, "far_winch": cable.far_winch}
+        for name, winch in ((name, each) for name, each in winches.items() if each is not None):
+            pull = winch.winding.available_tension()
+            if math.isfinite(pull):
+                path = f"cables.{scene.structure.planes[plane]}.{name}"
+                found.setdefault(f"{pull:.4g} N", []).append(path)
+    return "; ".join(f"{' and '.join(each)} pull at most {most}" for most, each in found.items())
 
 
 def _layout(scene: Scene) -> dict[str, str]:

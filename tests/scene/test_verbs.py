@@ -68,9 +68,14 @@ def test_check_tells_parts_within_parts_by_name_and_on_lines_that_can_be_read() 
     assert {"cables.upper", "cables.lower", "hinge spring"} <= {*labels}
     assert 'winch.winding.kind = "motor"' in line("\n".join(lines), "cables.upper")
     assert not [each for each in lines if re.search(r"=$|\.\d{13}", each)]
+    # 0.005 N m of the shaft, 100 turns for one of a drum of 20 mm, with 0.6 of the work.
+    assert line("\n".join(lines), "winches") == (
+        "cables.upper.winch and cables.lower.winch pull at most 15 N"
+    )
     # A second part that is as the first is told so.
     even = run("check", "ring18-cable")
     assert line(even, "cables.lower") == "as cables.upper"
+    assert "pull at most" not in even  # with any force
 
 
 def test_mass_is_the_sum_of_its_parts() -> None:
