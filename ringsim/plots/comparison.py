@@ -154,7 +154,7 @@ def pairs(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
             + (f" ({interval_text(low, high, 3)})" if np.isfinite(low + high) else "")
             + f", n\u00a0=\u00a0{int(known.sum())}", _WIDE).replace("\u00a0", " "), fontsize=9,
         )  # fmt: skip
-        axes.set_xlabel(f"{style.label(both[0][name], width=38)}, {first}", fontsize=9)
+        axes.set_xlabel(style.label(both[0][name], width=38, behind=f", {first}"), fontsize=9)
         axes.set_ylabel(style.unit_label(both[0][name]), fontsize=9)
         axes.ticklabel_format(useOffset=False)
         style.few_ticks(axes)

@@ -1,13 +1,10 @@
 """Style, words, labels and axes shared by all figures."""
 
-import base64
-import html
-import io
 import math
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
-from functools import cached_property, partial
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -18,8 +15,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
@@ -27,7 +22,6 @@ from matplotlib.path import Path as Outline
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from matplotlib.transforms import Bbox
-from PIL import Image
 
 from ringsim.scene import scene_from_toml
 from ringsim.tables import counted, known_to, readable, unit_behind
@@ -156,11 +150,22 @@ FIXED = "\u00a0"
 """A blank at which no line is broken."""
 
 
-def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> str:
+def meaning(words: str) -> str:
+    """The words of a variable without what follows on values that are missing.
+
+    >>> meaning("largest rate at a latch; missing if none caught")
+    'largest rate at a latch'
+    """
+    return words.partition(";")[0]
+
+
+def label(
+    variable: xr.DataArray, units: str | None = None, width: int = 60, behind: str = ""
+) -> str:  # fmt: skip
     r"""Meaning and unit of a variable, as on an axis: "Time since the start of the run (s)".
 
-    ``units`` replaces the variable's own where its values were scaled; lines longer than
-    ``width`` characters are broken, never within the unit.
+    ``units`` replaces the variable's own where its values were scaled, ``behind`` follows them;
+    lines longer than ``width`` characters are broken, never within the unit.
 
     >>> impulse = xr.DataArray(0.0, attrs={"long_name": "impulse of the stop", "units": "N m s"})
     >>> label(impulse, width=24)
@@ -171,9 +176,13 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
     if words.startswith(f"{variable.name} = "):  # by an expression: few blanks, wide letters
         words, width = words.replace("(", "( "), int(0.9 * width)
     else:
-        words = words[:1].upper() + words[1:]
-    held = unit_behind(words, units.replace(" ", FIXED))
+        words = _NUMBER.sub(FIXED, meaning(words[:1].upper() + words[1:]))
+    held = unit_behind(words, units.replace(" ", FIXED)) + behind
     return textwrap.fill(held, width).replace("( ", "(").replace(FIXED, " ")
+
+
+_NUMBER = re.compile(r"(?<=\d) (?=deg\b)")
+"""The blank before a unit in words."""
 
 
 def unit_label(variable: xr.DataArray) -> str:
@@ -511,83 +520,3 @@ def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
     free(axes.text(
         0.02, height, text, transform=axes.transAxes, va="top", weight="bold", zorder=5, bbox=PAPER
     ))  # fmt: skip
-
-
-@styled
-def as_png(figure: Figure) -> bytes:
-    """A figure as a notebook shows it."""
-    held = io.BytesIO()
-    figure.savefig(held, format="png", dpi=_DPI)
-    return held.getvalue()
-
-
-# A figure as text for an HTML page: SVG where it is light, PNG where it is not.
-
-
-HEAVY = 120_000
-"""Bytes of SVG above which a figure goes into a page as PNG."""
-_ARTISTS = 800
-"""Artists of a figure whose SVG is beyond that: 400 to 600 took 100 to 170 thousand."""
-_DPI = 110
-_PIXELS = 96.0
-"""Of a page in an inch; figures larger than drawn would have words larger than the page's."""
-
-
-class Inline:
-    """A figure as an element of an HTML page that loads nothing and is described by ``words``.
-
-    The same figure gives the same text.  Ids begin with ``name``, since all figures of a page
-    share one space of them, and matplotlib numbers them alike in each.
-    """
-
-    def __init__(self, figure: Figure, name: str, words: str) -> None:
-        self._figure, self._name, self._words = figure, name, words
-        self._size = f'style="--wide: {_PIXELS * figure.get_size_inches()[0]:.0f}px"'
-
-    def element(self, heavy: int = HEAVY) -> str:
-        """``<svg>``, or ``<img>`` if that has more than ``heavy`` characters."""
-        # Of so many artists lines are never light, and drawing them would be in vain.
-        if len(self._figure.findobj()) > _ARTISTS or len(self._lines) > heavy:
-            return self._picture
-        return self._lines
-
-    @cached_property
-    def _placed(self) -> Figure:
-        """The figure with its layout found once, which costs as much as drawing it twice."""
-        if (engine := self._figure.get_layout_engine()) is not None:
-            engine.execute(self._figure)
-            self._figure.set_layout_engine("none")
-        return self._figure
-
-    @cached_property
-    @styled
-    def _lines(self) -> str:
-        held, name = io.StringIO(), self._name
-        with matplotlib.rc_context({"svg.hashsalt": name}):
-            # By the canvas itself: savefig draws a figure twice that had a layout to find.
-            self._placed.set_dpi(matplotlib.rcParams["savefig.dpi"])
-            canvas: Any = FigureCanvasSVG(self._placed)
-            canvas.print_svg(held, metadata={"Date": None})
-        text = held.getvalue()
-        text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
-        text = re.sub(r'\bid="', f'id="{name}-', text)
-        text = re.sub(r'(xlink:href="|url\()#', rf"\g<1>#{name}-", text)
-        # In a page the size is that of the column; the names of its XML dialects are known there.
-        end = text.index(">")
-        opening = re.sub(r' (xmlns(:xlink)?|width|height|version)="[^"]*"', "", text[:end])
-        label = f' role="img" aria-label="{html.escape(self._words)}" {self._size}'
-        return opening + label + text[end:]
-
-    @cached_property
-    @styled
-    def _picture(self) -> str:
-        self._placed.set_dpi(_DPI)
-        canvas: Any = FigureCanvasAgg(self._placed)
-        canvas.draw()
-        drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-        # 256 colours are a third of the bytes, and nobody sees a difference.
-        few, picture = drawn.quantize(dither=Image.Dither.NONE), io.BytesIO()
-        few.save(picture, format="png")  # optimised it takes ten times as long for 8 % less
-        data = base64.b64encode(picture.getvalue()).decode("ascii")
-        words = html.escape(self._words)
-        return f'<img alt="{words}" {self._size} src="data:image/png;base64,{data}">'

@@ -6,10 +6,9 @@ One subject is one function, with ``@item`` for each clause that it answers; not
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -22,23 +21,28 @@ from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quanti
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.residuals import residual_table, residuals
 from ringsim.analysis.study import SOURCES, analyse
-from ringsim.analysis.study_text import (
-    error_tables,
-    head_lines,
-    outcome_table,
-    statistics_table,
-    unit_of,
-)
+from ringsim.analysis.study_text import error_tables, head_lines, statistics_table
 from ringsim.analysis.tails import tail_table
-from ringsim.analysis.verdicts import BOUND, SHARE_MET, verdict_table
 from ringsim.analysis.worst import command, margin_table, worst_tables
 from ringsim.files import write_text
 from ringsim.measured import Measurement
+from ringsim.outputs.family import Array
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
-from ringsim.report.page import drawn_inputs, provenance, values_of
+from ringsim.report.answers import (
+    Answer,
+    Ask,
+    Of,
+    cells_of,
+    drawn_lines,
+    evidence_of,
+    fates,
+    outputs,
+    verdicts,
+)
+from ringsim.report.page import provenance, values_of
 from ringsim.report.shell import written
-from ringsim.tables import Table, block_lines, counted, number_text, with_unit
+from ringsim.tables import Table, block_lines, counted, with_unit
 from ringsim.variables import Status
 
 ECSS = "ECSS-E-ST-33-01C (6 March 2009), Mechanisms"
@@ -56,44 +60,6 @@ _MEANS = (
     f"{ANALYSED} says that the campaign has the numbers, not that the antenna complies: the review "
     "judges that; what is missing stands in the result, in brackets what would supply it"
 )
-
-
-class Of(NamedTuple):
-    """What items are answered from."""
-
-    campaign: xr.Dataset
-    analysis: xr.Dataset
-    scene: Mapping[str, Any]
-    """Values of the scene by path."""
-    numbers: Table
-    """The statistics of all outputs."""
-    errors: Sequence[Table]
-    """The error budget, and errors of the solution."""
-    mark: str
-    """What stands behind outputs that lost runs bend."""
-    test: Table
-    """Readings of a test beside the samples, without rows where there are none."""
-
-
-@dataclass
-class Answer:
-    """What a campaign says about one clause."""
-
-    result: list[str] = field(default_factory=list)
-    evidence: list[str] = field(default_factory=list)
-    lacks: dict[str, str] = field(default_factory=dict)
-    """What is missing, and the key or command that would supply it."""
-
-    def __add__(self, other: "Answer") -> "Answer":
-        """Both, each line once."""
-        return Answer(
-            list(dict.fromkeys(self.result + other.result)),
-            list(dict.fromkeys(self.evidence + other.evidence)),
-            self.lacks | other.lacks,
-        )
-
-
-Ask = Callable[[Of], Answer]
 
 
 class Item(NamedTuple):
@@ -190,116 +156,12 @@ def write_dossier(
     return len(text.encode("utf-8")), block_lines(tables, head)
 
 
-# What several items tell: outputs, requirements, inputs, each out of a table of the analysis.
-
-
-def _cells(tables: Iterable[Table], name: str) -> dict[str, str]:
-    """The cells of an output in tables, by the heads of their columns; empty without a row."""
-    rows = ((each.head, row) for each in tables for row in each.rows)
-    own = (
-        dict(zip(*each, strict=True)) for each in rows if each[1][0] in (name, name + notes.MARK)
-    )
-    return next(own, {})
-
-
-def outputs(**cures: str) -> Ask:
-    """An answer by outputs, and what supplies those that are missing, if that is said."""
-
-    def answer(of: Of) -> Answer:
-        found, evidence = Answer(), dict[str, list[str]]()
-        for name, cure in cures.items():
-            if name in of.analysis:
-                found.result.append(_output(of, name))
-                evidence.setdefault(_evidence(of, name), []).append(name)
-            elif cure:
-                key = re.match(r"([\w.]+) = true", cure)
-                there = key is not None and of.scene.get(key[1]) is True
-                found.lacks[name] = "no sample has a value" if there else cure
-        for told, names in evidence.items():
-            found.evidence.append(f"{', '.join(names)}: " * (len(evidence) > 1) + told)
-        return found
-
-    return answer
-
-
-def _output(of: Of, name: str) -> str:
-    """An output: mean with its interval, the quantile at its worse end, the worst sample."""
-    (factor, unit), told = unit_of(of.analysis, name), f"{name}{of.mark}"
-    cell, larger = _cells([of.numbers], name), quantities()[name].badness > 0
-    if not cell:
-        value = number_text(factor * float(of.analysis[name][-1]))
-        return f"{told}: {with_unit(value, unit)} in all samples that have it"
-    words = [f"from {cell['least']} to {with_unit(cell['most'], unit)}"]
-    if cell["mean"] != "-":
-        known, far = cell["95 % interval of it"], "95 %" if larger else "5 %"
-        words = [f"mean {with_unit(cell['mean'], unit)}" + f" (interval {known})" * (known != "-")]
-        words += [f"{far} quantile {with_unit(cell[far], unit)}"]
-    if (sample := cell["worst sample"]) != "-":
-        worst = with_unit(cell["most" if larger else "least"], unit)
-        words.append(f"worst {worst} in sample {sample}")
-    return f"{told}: {'; '.join(words)}"
-
-
-def _evidence(of: Of, name: str) -> str:
-    """Of how many samples an output is, and its largest numerical errors."""
-    used, lost, absent, _ = of.analysis[f"{name}_samples"].values
-    cell, unit = _cells(of.errors, name), unit_of(of.analysis, name)[1]
-    words = [f"{used} of {used + lost + absent} samples"]
-    for most, count, told in (
-        ("largest bar", "samples with bars", "error bar"),
-        ("largest difference", "samples checked", "engine difference"),
-    ):
-        if cell.get(most, "-") != "-":
-            number, _, where = cell[most].partition(" ")
-            of_all = "largest of " * (cell[count] != "1") + counted(int(cell[count]), told)
-            words.append(f"{of_all}: {with_unit(number, unit)} {where}".rstrip())
-    return "; ".join(words)
-
-
-def _verdicts(of: Of, *names: str) -> Answer:
-    """The verdicts on requirements, all without names."""
-    found, table = Answer(), verdict_table(of.analysis)
-    for row in table.rows:
-        cell = dict(zip(table.head, row, strict=True))
-        name = cell["requirement"].split()[0]
-        if names and name not in names:
-            continue
-        bound, lost, go = cell[BOUND], cell["failed runs"], cell["samples to go"]
-        found.result.append(
-            f"{cell['requirement']} in at least {cell['probability']} of all (confidence "
-            f"{cell['confidence']}): {cell['verdict']}" + f"; {SHARE_MET}: {bound}" * (bound != "-")
-        )
-        found.evidence.append(
-            f"{name}: {cell['violating']} of {cell['samples used']} samples violate it"
-            + f", {lost} failed" * (lost != "0")
-            + f"; {go} more without a violation would prove it" * (go != "-")
-        )
-    return found
-
-
-def _drawn(of: Of, chosen: Callable[[str, str], bool]) -> list[str]:
-    """Inputs that are chosen by path and unit, with their laws and what was drawn."""
-    return [
-        f"{name}: {law}; drawn: {extent} {unit}".rstrip(" -")
-        for name, unit, _, law, extent, paths in drawn_inputs(of.campaign)
-        if any(chosen(path, unit) for path in paths.split(", "))
-    ]
-
-
-def _ends(of: Of) -> list[str]:
-    """What became of the antennas, with shares."""
-    return [
-        f"{kind}: {samples}" + f", share {share} (interval {ends})" * (ends != "-")
-        for kind, samples, share, ends, *_ in outcome_table(of.analysis).rows
-    ]
-
-
 # ECSS-E-ST-33-01C.
 
 
 @item(ECSS, "4.2.5.1, 4.8.2.9 Reliability", "How often the function succeeds.")
 def _reliability(of: Of) -> Answer:
-    shown, found, rare = _verdicts(of, OUTCOME), Answer(_ends(of)), tail_table(of.analysis)
+    shown, found, rare = verdicts(of, OUTCOME), Answer(fates(of)), tail_table(of.analysis)
     found.result += [f"{rare.head[1]}: {what}: {told}" for what, told in rare.rows]
     if not shown.result:
         law = 'outcome = { is = "deployed", probability = P, confidence = C }'
@@ -309,7 +171,9 @@ def _reliability(of: Of) -> Answer:
 
 @item(ECSS, "4.7.4.2, 4.8.2.3 Thermal design", "It works at all temperatures and gradients.")
 def _temperature(of: Of) -> Answer:
-    found = Answer(_drawn(of, lambda path, unit: unit == "K" or path.startswith("temperature.")))
+    found = Answer(
+        drawn_lines(of, lambda path, unit: unit == "K" or path.startswith("temperature."))
+    )
     for path, values in of.scene.items():
         if path.startswith("temperature.") and path.endswith(".temperatures"):
             known = f"{path.removesuffix('.temperatures')} for {values[0]:g} to {values[-1]:g} K"
@@ -317,7 +181,7 @@ def _temperature(of: Of) -> Answer:
     if not found.result:
         cure = "draw temperature.joint.value, temperature.pulley.value or an input of unit K"
         return found + Answer(lacks={"scatter of temperatures": cure})
-    found.result += _ends(of)
+    found.result += fates(of)
     found.lacks["gradients"] = "parts of one kind have one temperature: other cases by [set]"
     return found
 
@@ -330,17 +194,16 @@ def _strength(of: Of) -> Answer:
     found, margins = outputs(**dict.fromkeys(_ALLOWABLES, ""))(of), margin_table(of.analysis).rows
     for name, limit in _ALLOWABLES.items():
         own = [row for row in margins if row[0].startswith(limit)]
-        found += _verdicts(of, name)
         for told, of_what, worst, margin, sample, beyond in own:
             worst += f" in sample {sample}; beyond it {beyond}"
             found.result.append(f"{told}: margin {margin}, of {of_what} {worst}")
             found.lacks["factor of safety F"] = "the project's; then (1 + margin) / F - 1"
-        stress = name == "peak_rod_stress" and name not in of.analysis
-        found.lacks |= {name: "record.stress = true"} if stress else {}
+        if stress := name == "peak_rod_stress" and name not in of.analysis:
+            found.lacks[name] = "record.stress = true"
         there = stress or name in of.analysis  # without cables nothing has a tension
         if there and not own and limit not in of.scene.keys() | by_path(of.campaign).keys():
             found.lacks[f"allowable of {name}"] = limit
-    return found + Answer()
+    return found
 
 
 @item(
@@ -351,37 +214,46 @@ def _strength(of: Of) -> Answer:
 def _drive(of: Of) -> Answer:
     name, kind, wanted = "least_drive_margin", of.scene.get("margin.kind"), "ecss-e-st-33-01c"
     cure = f'margin.kind = "{wanted}", and winches with motors, whose pull has a bound'
-    found, values = outputs(least_drive_margin=cure)(of), numbers(of.campaign, name)
-    held = good(of.campaign) & np.isfinite(values)
-    if not held.any():
+    found, held = outputs(least_drive_margin=cure)(of), good(of.campaign)
+    values = np.where(held, numbers(of.campaign, name), np.nan)
+    if not np.isfinite(values).any():
         return found
-    k, short = int(np.argmin(np.where(held, values, np.inf))), int((values[held] < 0.0).sum())
+    k, late = int(np.nanargmin(values)), of.analysis.attrs.get(notes.LATE)
     angle, time = (numbers(of.campaign, f"{name}_{word}")[k] for word in ("angle", "time"))
     found.result += [
         f"in sample {int(of.campaign['sample'][k])} it is least at {angle:.3g} deg, {time:.3g} s",
-        f"below 0 in {short} of {int(held.sum())} samples" + ": NOT enough" * bool(short),
-        *filter(None, [of.analysis.attrs.get(notes.LATE)]),
+        _below_zero(values),
+        *filter(None, [late]),
     ]
-    factors = ", ".join(
-        f"{path.removeprefix('margin.').replace('_', ' ')} {show(value)}"
-        for path, value in of.scene.items() if path.startswith("margin.")
-    )  # fmt: skip
-    found.evidence.append(f"static margin at all angles passed; {factors}")
-    lacks = {} if kind == wanted else {"the factors of this clause": f'margin.kind = "{wanted}"'}
-    return found + _verdicts(of, name) + Answer(lacks=lacks)
+    later = f"{name}_started"
+    if later in of.analysis and (late or verdicts(of, later).result):
+        values = numbers(of.campaign, later)[held]
+        found += outputs(**{later: ""})(of) + Answer([f"{later}: {_below_zero(values)}"])
+    own = ((path, show(v)) for path, v in of.scene.items() if path.startswith("margin."))
+    factors = (f"{path.removeprefix('margin.').replace('_', ' ')} {told}" for path, told in own)
+    found.evidence.append(f"static margin at all angles passed; {', '.join(factors)}")
+    if kind != wanted:
+        found.lacks["the factors of this clause"] = f'margin.kind = "{wanted}"'
+    return found
+
+
+def _below_zero(values: Array) -> str:
+    """In how many samples a margin is not enough."""
+    short, known = int((values < 0.0).sum()), int(np.isfinite(values).sum())
+    return f"below 0 in {short} of {known} samples" + ": NOT enough" * bool(short)
 
 
 @item(ECSS, "4.7.5.4.3 Latching or locking", "Latches catch at all temperatures and tolerances.")
 def _latching(of: Of) -> Answer:
     found = outputs(latched_joints="stop.latch = true", least_latch_rate="")(of)
     if found.result:
-        found.result = [line for line in _ends(of) if line.startswith(REACHED)] + found.result
+        found.result = [line for line in fates(of) if line.startswith(REACHED)] + found.result
         if rate := of.scene.get("latch.min_rate"):
             drawn = ", as drawn" * ("latch.min_rate" in by_path(of.campaign))
             found.evidence.append(f"a latch catches from {show(rate)} rad/s on{drawn}")
         others = _temperature(of).lacks | _tolerances(of).lacks
         found.lacks |= {what: others[what] for what in others if what.startswith("scatter")}
-    return found + _verdicts(of, "latched_joints", "least_latch_rate")
+    return found
 
 
 @item(ECSS, "4.8.2.1 Cases", "Extremes together, and what the ground changes: weight, test rig.")
@@ -412,7 +284,7 @@ _LENGTHS = "structure.", "rods.length_error", "rods.diagonal", "rods.bar", "boom
 
 @item(ECSS, "4.8.2.5 Tolerance budget", "Manufacturing tolerances together with worst loads.")
 def _tolerances(of: Of) -> Answer:
-    own = _drawn(of, lambda path, unit: path.startswith(_LENGTHS) and unit in ("m", ""))
+    own = drawn_lines(of, lambda path, unit: path.startswith(_LENGTHS) and unit in ("m", ""))
     if own:
         return Answer(own) + outputs(best_fit_rms="record.shape = true")(of)
     return Answer(lacks={"scatter of lengths": "draw rods.length_error or structure.hinge_error"})
@@ -420,7 +292,7 @@ def _tolerances(of: Of) -> Answer:
 
 @item(ECSS, "4.8.2.6.3 a Conformance", "Each requirement is kept, with parameters at their worst.")
 def _requirements(of: Of) -> Answer:
-    found = _verdicts(of)
+    found = verdicts(of)
     if not found.result:
         return Answer(lacks={"requirements": "[requirements]"})
     return found + Answer(lacks={k: v for k, v in _cases(of).lacks.items() if k == _EXTREMES})
@@ -428,7 +300,9 @@ def _requirements(of: Of) -> Answer:
 
 @item(ECSS, "4.8.2.6.3 b Failure cases", "Failures of parts, and what to do then.")
 def _faults(of: Of) -> Answer:
-    found = Answer(_drawn(of, lambda path, _: path.startswith("faults") or "stop_time" in path))
+    found = Answer(
+        drawn_lines(of, lambda path, _: path.startswith("faults") or "stop_time" in path)
+    )
     found.result += notes.reached_by_words(of.campaign, "faults")
     if "case" in of.analysis.dims:
         ends = Counter(of.analysis["case_outcome"].values.tolist())
@@ -457,7 +331,7 @@ _SHOWN = 5  # outputs that are told what matters for, where no requirement choos
 @item(NASA, "factor 5, results robustness (second-hand)", "How results change with the inputs.")
 def _sensitivity(of: Of) -> Answer:
     table = what_matters(of.analysis)
-    wanted = [line.partition(":")[0] for line in _verdicts(of).evidence]
+    wanted = [line.partition(":")[0] for line in verdicts(of).evidence]
     rows = [row for row in table.rows if row[0]]
     plain = [row for row in rows if row[0] in quantities() and quantities()[row[0]].summary]
     own = [row for row in rows if row[0] in wanted] or (plain or rows)[:_SHOWN]
@@ -498,7 +372,7 @@ def _validation(of: Of) -> Answer:
 @item(NASA, "factor 1, verification (second-hand)", "How large numerical errors are.")
 def _verification(of: Of) -> Answer:
     found, own = _integrity(of), [name for name in quantities() if not is_moment(name)]
-    told = {name: _evidence(of, name).partition("; ")[2] for name in own if name in of.analysis}
+    told = {name: evidence_of(of, name).partition("; ")[2] for name in own if name in of.analysis}
     found.result += [f"{name}: {errors}" for name, errors in told.items() if errors]
     if not any("bar" in errors for errors in told.values()):
         found.lacks["numerical error bars"] = "error_bars_every"
@@ -517,13 +391,17 @@ _ORIGINS = {
     "inferred": "marked inferred in the scene", "scene": "of the scene's file",
     "default": "defaults of ringsim",
 }  # fmt: skip
+_UNTOLD = "of the scene's file or defaults of ringsim"
+"""Of a scene of one's own a campaign does not tell which."""
 
 
 @item(NASA, "factor 3, input pedigree (second-hand)", "Where inputs come from, and how sure.")
 def _pedigree(of: Of) -> Answer:
-    counts = Counter(each.origin for each in values_of(of.campaign)[0])
-    told = ", ".join(f"{counts[k]} {word}" for k, word in _ORIGINS.items() if counts[k])
-    found = Answer([f"{counts.total()} values: {told}", *_drawn(of, lambda *_: True)])
+    values, head = values_of(of.campaign)
+    counts = Counter(each.origin for each in values)
+    words = _ORIGINS if head else _ORIGINS | {"scene": _UNTOLD}
+    told = ", ".join(f"{counts[k]} {word}" for k, word in words.items() if counts[k])
+    found = Answer([f"{counts.total()} values: {told}", *drawn_lines(of, lambda *_: True)])
     found.evidence.append("ringsim report lists every value and its origin")
     found.result += learnt_lines(of.campaign)
     if not learnt_lines(of.campaign):
@@ -547,7 +425,7 @@ def _uncertainty(of: Of) -> Answer:
     found.evidence.append(f"{says['samples_run']} of {says['samples']} samples have run")
     largest = dict[str, list[str]]()
     for name in quantities():
-        cell = _cells(of.errors, name)
+        cell = cells_of(of.errors, name)
         source = cell.get("dominates", "-").partition(" ")[0].strip("-")
         if source and not is_moment(name):
             bare = cell["numerical (error bars)"] == "-"

@@ -138,3 +138,19 @@ def test_requirements_that_fail_are_drawn_and_what_is_left_out_has_its_reason() 
     assert f"not all samples tell of them: the requirements of {numbers[0]}." in words(
         convergence(campaign)
     )
+
+
+def test_shares_of_none_and_of_all_are_lines_inside_the_frame() -> None:
+    campaign = made_campaign(16)
+    about = {"probability": 0.9, "confidence": 0.9}
+    never, always = about | {"max": -1.0}, about | {"max": 1e3}
+    wanted = {"asynchrony_max": never, "peak_tension": always}
+    campaign.attrs["requirements"] = json.dumps(wanted)
+    figure = convergence(campaign)
+    figure.draw_without_rendering()
+    for start, height in (("asynchrony_max <=", 0.0), ("peak_tension <=", 1.0)):
+        axes = panel(figure, start)
+        assert set(axes.lines[0].get_ydata()) == {height}
+        frame, (_, at) = axes.get_window_extent(), axes.transData.transform((1.0, height))
+        assert frame.y0 + 2.0 < at < frame.y1 - 2.0
+        assert all(tick >= 0.0 for tick in axes.get_yticks() if tick >= axes.get_ylim()[0])

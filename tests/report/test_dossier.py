@@ -341,6 +341,63 @@ def test_more_of_a_campaign_is_analysed_once_it_has_it() -> None:
 
 
 @pytest.mark.quick
+def test_each_clause_gives_the_verdicts_on_the_outputs_that_it_names() -> None:
+    campaign = made_campaign(8).assign(peak_latch_rate=("sample", np.linspace(0.2, 0.9, 8)))
+    about = {"probability": 0.5, "confidence": 0.9}
+    wanted = {"deployment_time": 99.0, "asynchrony_max": 1.0, "peak_latch_rate": 0.6}
+    limits = {name: about | {"max": most} for name, most in wanted.items()}
+    campaign.attrs["requirements"] = json.dumps(limits)
+    rows = rows_of(campaign)
+    for clause, name in (
+        ("Mechanism function", "deployment_time"), ("Mechanism function", "asynchrony_max"),
+        ("Shock", "peak_latch_rate"),
+    ):  # fmt: skip
+        said = [line for line in row(rows, clause)["result"].splitlines() if name in line]
+        assert said[0].startswith(f"{name}: ")
+        assert said[1].startswith(f"{name} <= {wanted[name]:g} ")
+        assert f"{name}: " in row(rows, clause)["evidence"]
+    found = row(rows, "Shock")
+    assert "in at least 0.5 of all (confidence 0.9): not yet shown" in found["result"]
+    assert "peak_latch_rate: 3 of 8 samples violate it" in found["evidence"]
+
+
+@pytest.mark.quick
+def test_a_margin_from_the_start_of_the_last_winch_on_has_its_own_count_and_verdict() -> None:
+    campaign = with_motors(made_campaign(12))
+    for place in ("angle", "time"):
+        campaign[f"least_drive_margin_{place}"] = "sample", 20.0 + np.arange(12.0)
+    name = "least_drive_margin_started"
+    campaign[f"{name}_angle"] = "sample", np.full(12, 25.0)
+    campaign[name] = campaign["least_drive_margin"] + 0.3
+    said = row(rows_of(campaign), "motorization)")["result"].splitlines()
+    assert "below 0 in 5 of 12 samples: NOT enough" in said
+    assert f"{name}: below 0 in 2 of 12 samples: NOT enough" in said
+    about = {"min": 0.0, "probability": 0.9, "confidence": 0.9}
+    campaign.attrs["requirements"] = json.dumps({name: about})
+    own = row(rows_of(campaign), "motorization)")
+    assert f"{name} >= 0 in at least 0.9 of all" in own["result"]
+    assert f"{name}: 2 of 12 samples violate it" in own["evidence"]
+    # Where all winches start at once both are the same, and one is told.
+    campaign.attrs["requirements"] = "{}"
+    campaign[name] = campaign["least_drive_margin"]
+    assert name not in row(rows_of(campaign), "motorization)")["result"]
+
+
+@pytest.mark.quick
+def test_values_of_a_scene_of_ones_own_may_be_defaults() -> None:
+    campaign = made_campaign(4)
+
+    def told() -> str:
+        own = row(rows_of(campaign, NASA), "input pedigree (second-hand)")
+        return own["result"].splitlines()[0]
+
+    assert " of the scene's file, " in told()
+    assert re.search(r"\d defaults of ringsim$", told())
+    campaign.attrs["campaign"] = campaign.attrs["campaign"].replace("ring18-cable", "mine.toml")
+    assert told().endswith(" of the scene's file or defaults of ringsim")
+
+
+@pytest.mark.quick
 def test_both_engines_are_told_apart() -> None:
     campaign = made_campaign(8)
     own = {name: campaign[name].copy(deep=True) for name in ("status", "outcome", "peak_tension")}

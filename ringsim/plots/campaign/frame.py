@@ -112,7 +112,7 @@ def mark_panels(figure: Figure, names: Collection[str]) -> bool:
     """Mark panels and axes that are of outputs which may be off; whether there are any."""
     both = [(VARIABLES[n], VARIABLES.get(VARIABLES[n].largest_of or VARIABLES[n].least_of))
             for n in names]  # fmt: skip
-    words = [each.long_name.lower() for pair in both for each in pair if each is not None]
+    words = [style.meaning(e.long_name.lower()) for pair in both for e in pair if e is not None]
     texts = [
         text for axes in figure.axes
         for text in (*_titles(axes), axes.xaxis.label, axes.yaxis.label)

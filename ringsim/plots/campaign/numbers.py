@@ -134,6 +134,8 @@ def _told(variable: xr.DataArray, limit: float) -> str:
 _POINTS = 400
 _MOST_REQUIRED, _LEAST_NUMBERS, _COLUMNS = 9, 3, 3
 """Requirements on a sheet at most, numbers for which they leave room, and panels in a row."""
+_TITLE = 42
+"""Letters of a title above a panel."""
 _INTERVALS = 12
 """Points of the band: each costs a bootstrap."""
 
@@ -246,7 +248,7 @@ def convergence(campaign: xr.Dataset) -> Figure:
         axes.plot(counts, far, color=style.VERMILION, linestyle="dashed", marker="s",
                   markersize=size, label=worse)  # fmt: skip
         axes.ticklabel_format(axis="y", useOffset=False)
-        _named(axes, style.label(campaign[name], width=42), len(values))
+        _named(axes, style.label(campaign[name], width=_TITLE), len(values))
     for axes, (name, each) in zip(panels[len(names) :], wanted.items(), strict=True):
         kept = ~violations(campaign, name, each)[good(campaign)]
         counts = _counts(len(kept), _POINTS)
@@ -257,9 +259,10 @@ def convergence(campaign: xr.Dataset) -> Figure:
         axes.plot(counts, share, color=style.GREEN, label="share that meets it")
         axes.axhline(each.probability, color=style.INK, linewidth=1.1, linestyle=(0, (4, 3)),
                      label="required probability")  # fmt: skip
-        axes.set_ylim(max(0.0, min(share.min(), ends.min()) - 0.02), 1.02)
+        # Lines at 0 and 100 % are inside the frame, not on it.
+        axes.set_ylim(max(0.0, min(share.min(), ends.min())) - 0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        _named(axes, each.told(name), len(kept))
+        _named(axes, textwrap.fill(each.told(name), _TITLE), len(kept))
     legend(figure, panels)
     most = max((len(values_of(campaign, name)[0]) for name in names), default=0)
     caption = f"{told(campaign, most)}.{blocks}{flat}"

@@ -406,7 +406,8 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         says = campaign[name].attrs
-        title = unit_behind(str(says.get("long_name", name)), str(says.get("units", "1")))
+        title = style.meaning(str(says.get("long_name", name)))
+        title = unit_behind(title, str(says.get("units", "1")))
         axes.set_title(title, fontsize=9.5)
     places = named(len(samples))
     names_shown = [short(words[k]) for k in places]

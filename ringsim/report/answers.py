@@ -1,0 +1,160 @@
+"""What answers to clauses are made of: outputs with their verdicts, inputs, endings, each out of a
+table of the analysis.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import xarray as xr
+
+from ringsim.analysis import campaign_notes as notes
+from ringsim.analysis.intervals import quantities
+from ringsim.analysis.study_text import outcome_table, unit_of
+from ringsim.analysis.verdicts import BOUND, SHARE_MET, verdict_table
+from ringsim.report.page import drawn_inputs
+from ringsim.tables import Table, counted, number_text, with_unit
+
+
+class Of(NamedTuple):
+    """What items are answered from."""
+
+    campaign: xr.Dataset
+    analysis: xr.Dataset
+    scene: Mapping[str, Any]
+    """Values of the scene by path."""
+    numbers: Table
+    """The statistics of all outputs."""
+    errors: Sequence[Table]
+    """The error budget, and errors of the solution."""
+    mark: str
+    """What stands behind outputs that lost runs bend."""
+    test: Table
+    """Readings of a test beside the samples, without rows where there are none."""
+
+
+@dataclass
+class Answer:
+    """What a campaign says about one clause."""
+
+    result: list[str] = field(default_factory=list)
+    evidence: list[str] = field(default_factory=list)
+    lacks: dict[str, str] = field(default_factory=dict)
+    """What is missing, and the key or command that would supply it."""
+
+    def __add__(self, other: "Answer") -> "Answer":
+        """Both, each line once."""
+        return Answer(
+            list(dict.fromkeys(self.result + other.result)),
+            list(dict.fromkeys(self.evidence + other.evidence)),
+            self.lacks | other.lacks,
+        )
+
+
+Ask = Callable[[Of], Answer]
+
+
+def cells_of(tables: Iterable[Table], name: str) -> dict[str, str]:
+    """The cells of an output in tables, by the heads of their columns; empty without a row."""
+    rows = ((each.head, row) for each in tables for row in each.rows)
+    own = (
+        dict(zip(*each, strict=True)) for each in rows if each[1][0] in (name, name + notes.MARK)
+    )
+    return next(own, {})
+
+
+def outputs(**cures: str) -> Ask:
+    """An answer by outputs, each with the verdict on what is required of it, and what supplies
+    those that are missing, if that is said.
+    """
+
+    def answer(of: Of) -> Answer:
+        found, evidence, judged = Answer(), dict[str, list[str]](), Answer()
+        for name, cure in cures.items():
+            if name in of.analysis:
+                own = verdicts(of, name)
+                found.result += [output_line(of, name), *own.result]
+                judged.evidence += own.evidence
+                evidence.setdefault(evidence_of(of, name), []).append(name)
+            elif cure:
+                key = re.match(r"([\w.]+) = true", cure)
+                there = key is not None and of.scene.get(key[1]) is True
+                found.lacks[name] = "no sample has a value" if there else cure
+        for told, names in evidence.items():
+            found.evidence.append(f"{', '.join(names)}: " * (len(evidence) > 1) + told)
+        return found + judged
+
+    return answer
+
+
+def output_line(of: Of, name: str) -> str:
+    """An output: mean with its interval, the quantile at its worse end, the worst sample."""
+    (factor, unit), told = unit_of(of.analysis, name), f"{name}{of.mark}"
+    cell, larger = cells_of([of.numbers], name), quantities()[name].badness > 0
+    if not cell:
+        value = number_text(factor * float(of.analysis[name][-1]))
+        return f"{told}: {with_unit(value, unit)} in all samples that have it"
+    words = [f"from {cell['least']} to {with_unit(cell['most'], unit)}"]
+    if cell["mean"] != "-":
+        known, far = cell["95 % interval of it"], "95 %" if larger else "5 %"
+        words = [f"mean {with_unit(cell['mean'], unit)}" + f" (interval {known})" * (known != "-")]
+        words += [f"{far} quantile {with_unit(cell[far], unit)}"]
+    if (sample := cell["worst sample"]) != "-":
+        worst = with_unit(cell["most" if larger else "least"], unit)
+        words.append(f"worst {worst} in sample {sample}")
+    return f"{told}: {'; '.join(words)}"
+
+
+def evidence_of(of: Of, name: str) -> str:
+    """Of how many samples an output is, and its largest numerical errors."""
+    used, lost, absent, _ = of.analysis[f"{name}_samples"].values
+    cell, unit = cells_of(of.errors, name), unit_of(of.analysis, name)[1]
+    words = [f"{used} of {used + lost + absent} samples"]
+    for most, count, told in (
+        ("largest bar", "samples with bars", "error bar"),
+        ("largest difference", "samples checked", "engine difference"),
+    ):
+        if cell.get(most, "-") != "-":
+            number, _, where = cell[most].partition(" ")
+            of_all = "largest of " * (cell[count] != "1") + counted(int(cell[count]), told)
+            words.append(f"{of_all}: {with_unit(number, unit)} {where}".rstrip())
+    return "; ".join(words)
+
+
+def verdicts(of: Of, name: str = "") -> Answer:
+    """The verdict on a requirement; without a name those on all."""
+    found, table = Answer(), verdict_table(of.analysis)
+    for row in table.rows:
+        cell = dict(zip(table.head, row, strict=True))
+        own = cell["requirement"].split()[0]
+        if name not in ("", own):
+            continue
+        bound, lost, go = cell[BOUND], cell["failed runs"], cell["samples to go"]
+        found.result.append(
+            f"{cell['requirement']} in at least {cell['probability']} of all (confidence "
+            f"{cell['confidence']}): {cell['verdict']}" + f"; {SHARE_MET}: {bound}" * (bound != "-")
+        )
+        found.evidence.append(
+            f"{own}: {cell['violating']} of {cell['samples used']} samples violate it"
+            + f", {lost} failed" * (lost != "0")
+            + f"; {go} more without a violation would prove it" * (go != "-")
+        )
+    return found
+
+
+def drawn_lines(of: Of, chosen: Callable[[str, str], bool]) -> list[str]:
+    """Inputs that are chosen by path and unit, with their laws and what was drawn."""
+    return [
+        f"{name}: {law}; drawn: {extent} {unit}".rstrip(" -")
+        for name, unit, _, law, extent, paths in drawn_inputs(of.campaign)
+        if any(chosen(path, unit) for path in paths.split(", "))
+    ]
+
+
+def fates(of: Of) -> list[str]:
+    """What became of the antennas, with shares."""
+    return [
+        f"{kind}: {samples}" + f", share {share} (interval {ends})" * (ends != "-")
+        for kind, samples, share, ends, *_ in outcome_table(of.analysis).rows
+    ]
