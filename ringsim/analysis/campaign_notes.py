@@ -42,6 +42,7 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import DOUBT, UNCERTAIN, may_be_off
+from ringsim.outputs.family import Array
 from ringsim.sampling.distributions import labels_of
 from ringsim.tables import (
     Table,
@@ -170,19 +171,14 @@ def late_line(campaign: xr.Dataset) -> str:
     """
     least, later = (numbers(campaign, f"least_drive_margin{end}") for end in ("", "_started"))
     held = good(campaign) & np.isfinite(least)
-    late = held & ~(later <= least)  # NaN of runs that ended before that start
-    if "least_drive_margin_started" not in campaign or not late.any():
+    if not (late := held & (later > least)).any():
         return ""
     which = _of(int(late.sum()), int(held.sum()))
     line = f"in {which} the least drive margin is that of a time before the last winch starts"
-    known = held & np.isfinite(later)
-    if not known.any():
-        return f"{line}, to which no run came"
-    k = int(np.argmin(np.where(known, later, np.inf)))
-    came = "all have" if known.sum() == held.sum() else f"the {known.sum()} that came so far have"
+    k = int(np.argmin(np.where(held, later, np.inf)))
     angle = numbers(campaign, "least_drive_margin_started_angle")[k]
     where = f"sample {int(campaign['sample'][k])}, at {angle:.4g} deg"
-    return f"{line}; from then on {came} at least {later[k]:.4g} ({where})"
+    return f"{line}; from then on all have at least {later[k]:.4g} ({where})"
 
 
 def _of(count: int, every: int) -> str:
@@ -378,11 +374,18 @@ def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], str]:
     return found, min(cures, default=(0.0, ""))[1]
 
 
-def uncertain_latches(campaign: xr.Dataset) -> Mask:
-    """Which samples say that it is uncertain whether one of their latches catches."""
-    reasons = campaign["reason"].to_numpy() if "reason" in campaign else np.array([])
-    said = [UNCERTAIN in str(reason) for reason in reasons] or [False] * campaign.sizes["sample"]
-    return np.asarray(good(campaign) & np.array(said))
+def uncertain_latches(campaign: xr.Dataset) -> Array:
+    """Of how many latches each sample says that it is uncertain whether they catch."""
+    found = np.zeros(campaign.sizes["sample"])
+    if "reason" in campaign:
+        reasons = campaign["reason"].to_numpy()
+        for place in np.flatnonzero(good(campaign)).tolist():
+            if said := _LATCHES.search(str(reasons[place])):
+                found[place] = said[1].count(",") + 1 + int(said[2] or 0)
+    return found
+
+
+_LATCHES = re.compile(rf"whether the latch of ([^;]*?)(?: and (\d+) more)? {UNCERTAIN}")
 
 
 _SETTING = re.compile(r"= ([\d.e+-]+)")

@@ -206,11 +206,33 @@ def statistics(
     campaign: xr.Dataset, placed: Placement, names: Collection[str] | None = None
 ) -> dict[str, Any]:
     """All variables about outputs (by default all that have a value), see ``analyse``."""
-    found = dict[str, Any]()
+    found, seen = dict[str, Any](), dict[str, list[tuple[str, Array]]]()
     for name in quantities() if names is None else names:
-        if name in campaign and np.isfinite(numbers(campaign, name)[good(campaign)]).any():
+        values = numbers(campaign, name)[good(campaign)] if name in campaign else np.empty(0)
+        if np.isfinite(values).any():
             found |= _output(campaign, name, placed)
+            others = seen.setdefault(quantities()[name].units, [])
+            twin = next((other for other, own in others if _equal(own, values)), "")
+            if twin:
+                found[name][2][TWIN] = twin
+            else:
+                others.append((name, values))
     return found
+
+
+TWIN = "same_as"
+"""Attribute of an output that has the values of another one in all samples."""
+
+
+def _equal(first: Array, second: Array) -> bool:
+    """Whether two outputs are the same in all samples, but for round-off; cheaply if they are not,
+    as most differ in the first few.
+    """
+    few = slice(0, 8)
+    return all(
+        np.allclose(first[part], second[part], rtol=1e-9, atol=0.0, equal_nan=True)
+        for part in (few, slice(None))
+    )
 
 
 def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any]:

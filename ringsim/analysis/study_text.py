@@ -46,10 +46,11 @@ from ringsim.analysis.reweighting import (
     SOBOL,
 )
 from ringsim.analysis.sensitivity import rarer_table, refusals
-from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
+from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, TWIN, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import (
     BOUND,
+    IF_HOLD,
     SHARE_MET,
     Verdict,
     decisive,
@@ -60,7 +61,6 @@ from ringsim.analysis.verdicts import (
     verdict_text,
 )
 from ringsim.analysis.worst import margin_table, margins, worst_lines, worst_tables
-from ringsim.outputs.family import Array
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import law_text
 from ringsim.tables import (
@@ -152,7 +152,9 @@ def _verdicts(analysis: xr.Dataset) -> Table:
     for name in analysis["requirement"].values:
         one = analysis.sel(requirement=name)
         rows.append((
-            one["requirement_text"].item(), Verdict(one["reweighted_verdict"].item()).words,
+            one["requirement_text"].item(),
+            Verdict(one["reweighted_verdict"].item()).words
+            + f", {IF_HOLD}" * bool(one["verdict_may_change"]),
             f"{one['probability_required'].item():g}", f"{one['confidence_required'].item():g}",
             number_text(one["reweighted_probability"].item()),
             decisive(Verdict(one["reweighted_verdict"].item()), *one["reweighted_bounds"].values),
@@ -351,7 +353,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     only if ``every`` one is told.
     """
     rows, few, alike, within = [], False, list[str](), list[str]()
-    known, again, flat = dict[str, Array](), list[str](), list[str]()
+    again, flat = list[str](), list[str]()
     wanted = analysis["requirement"].values if "requirement" in analysis.dims else ()
     for name in outputs_in(analysis):
         if is_moment(name) and not every:
@@ -366,11 +368,10 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
             value = "0" if abs(least) < NOTHING else f"{number_text(least)} {units}".rstrip()
             alike.append(f"{name} {value}" + f" (in {count})" * int(used < run))
             continue
-        twin = next((one for one, own in known.items() if _equal(own, values)), None)
+        twin = analysis[name].attrs.get(TWIN)
         if twin is not None and not every and name not in wanted:
             again.append(f"{name} is {twin}")
             continue
-        known[name] = values
         if hardly_apart(least, most) and not every and name not in wanted and np.isnan(bar):
             ends = f"{fine_text(least, fine)} .. {fine_text(most, fine)}"
             flat.append(f"{name} {ends} {units}".rstrip() + f" (in {count})" * int(used < run))
@@ -401,11 +402,6 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     if within:
         notes.append(f"{_WITHIN}: {'; '.join(within)}")
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
-
-
-def _equal(first: Array, second: Array) -> bool:
-    """Whether all statistics of two outputs are the same but for round-off."""
-    return np.allclose(first, second, rtol=1e-9, atol=0.0, equal_nan=True)
 
 
 _WITHIN = "no sample is farther from the mean than the numerical error"

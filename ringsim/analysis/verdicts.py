@@ -230,8 +230,11 @@ def judge(
     for name, wanted in requirements.items():
         require_values(campaign, name)
         off = doubted.get(name, none)
-        if name in (OUTCOME, "latched_joints"):
-            off = off | uncertain_latches(campaign)
+        if name == LATCHED or (name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word):
+            latches = uncertain_latches(campaign)
+            if name == LATCHED:  # so many more or fewer may have caught
+                latches = latches - np.abs(wanted.beyond(numbers(campaign, name)))
+            off = off | (latches > 0.0)
         for key, value in _judged(campaign, name, wanted, placed, rule, off).items():
             columns[key].append(value)
     known = {
@@ -356,13 +359,18 @@ def _close(campaign: xr.Dataset, name: str, wanted: Requirement) -> tuple[Mask, 
     return np.asarray(apart < np.where(known, bars, error)), error
 
 
+IF_HOLD = "if its numbers hold"
+"""Behind a verdict that numbers which may be off could change."""
+LATCHED = "latched_joints"
+
+
 def verdict_text(one: Mapping[str, Any]) -> str:
     """A verdict of ``judge`` in words, with how many values may be off if these could change it."""
     words = Verdict(one["verdict"]).words
     if not one["verdict_may_change"]:
         return words
     off, used = one["samples_may_be_off"], one["samples_used"]
-    return f"{words}, if its numbers hold: may be off in {off} of {counted(used, 'sample')}"
+    return f"{words}, {IF_HOLD}: may be off in {off} of {counted(used, 'sample')}"
 
 
 def _ended_short(campaign: xr.Dataset) -> Mask:
@@ -407,13 +415,13 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         error = with_unit(number_text(one["numerical_error"], 2), quantities()[name].units)
         told.append(
             f"{name}: in {counted(close, 'sample')} it is closer to the limit than its numerical "
-            f"error, {error} (root mean square of error bars): a smaller solver.tolerance settles "
-            "it"
+            f"error, {error} (root mean square of error bars): smaller steps, or more elements, "
+            "settle it"
         )
-    if others and name in (OUTCOME, "latched_joints"):
+    if others and name in (OUTCOME, LATCHED):
         told.append(
             f"{name}: in {counted(others, 'sample')} it is uncertain whether all latches catch, as "
-            "another joint locks in the same step: a smaller solver.tolerance settles it"
+            "another joint locks in the same step: smaller steps settle it"
         )
     return told
 
@@ -429,7 +437,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         bad, used = one["samples_violating"], one["samples_used"]
         if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
             one["probability"], chosen = np.nan, True
-            notes.append(f"{name}: {bad} of {used} samples violate it")
+            near = one["samples_close"]
+            but = f", and {near} are closer to the limit than the numerical error" * bool(near)
+            notes.append(f"{name}: {bad} of {used} samples violate it{but}")
         rows.append((
             one["requirement_text"], verdict_text(one), f"{one['probability_required']:g}",
             f"{one['confidence_required']:g}", number_text(one["probability"]),

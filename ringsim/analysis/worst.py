@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import LATE, doubted, late_line, marked
+from ringsim.analysis.campaign_notes import doubted, late_line, marked
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -519,9 +519,5 @@ def margin_table(analysis: xr.Dataset) -> Table:
         + (f"; {_DRIVE} is a margin already, with the factors of its standard")
         * any(of.startswith(_DRIVE) for _, of, *_ in rows)
     ] * any(not of.startswith(_DRIVE) for _, of, *_ in rows)
-    # A verdict on it says so below.
-    told = "requirement" in analysis.dims and _DRIVE in analysis["requirement"].values
-    late = "" if told else str(analysis.attrs.get(LATE, ""))
-    notes += filter(None, [late.partition(";")[0]])  # the rest is a row
     head = ("limit", "of", "worst value", "margin", "in sample", "samples beyond")
     return marked(Table(head, rows, notes, left=2), analysis, 2)

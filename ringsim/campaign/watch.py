@@ -94,8 +94,10 @@ class _Judge:
         self._requirements = required_by(campaign.attributes)
         self._derived = derived.known_from(campaign.attributes)
         named = [each.requirement or each.of for each in rule.conditions]
-        self._names = sorted({str(name) for name in named} - {OUTCOME})
+        outputs = {str(name) for name in named} - {OUTCOME}
+        self._names = sorted(outputs | {f"{name}_error" for name in outputs})
         self._known = {name: np.empty(0) for name in self._names}
+        self._reasons = np.empty(0, dtype=object)
         self._present: set[str] = set()
 
     def at(self, count: int) -> str | None:
@@ -106,9 +108,11 @@ class _Judge:
         found = first.survey()
         if len(found.missing) or len(first.unchecked()):
             return None
-        before = len(next(iter(self._known.values()))) if self._names else count
+        before = len(self._reasons)
+        reasons = np.full(count - before, "", dtype=object)
         more = {name: np.full(count - before, np.nan) for name in self._names}
-        for result in found.results(np.arange(before, count)) if self._names else ():
+        for result in found.results(np.arange(before, count)):
+            reasons[result.sample - before] = result.reason
             arrays = result.arrays()
             each = {n: v[None] for n, v in arrays.items()}
             arrays |= derived.over_samples(self._derived, each, arrays)
@@ -116,8 +120,10 @@ class _Judge:
                 if name in arrays:
                     more[name][result.sample - before] = arrays[name]
                     self._present.add(name)
+        self._reasons = np.append(self._reasons, reasons)
         self._known = {n: np.append(self._known[n], more[n]) for n in self._names}
         columns: dict[str, Any] = {"status": found.status, OUTCOME: found.fate}
+        columns["reason"] = self._reasons
         columns |= {name: self._known[name] for name in self._present}
         dataset = self._empty.assign({n: ("sample", v) for n, v in columns.items()})
         dataset = dataset.assign_coords(sample=np.arange(count))

@@ -275,7 +275,10 @@ def _stalls(scene: Scene) -> str:
             if math.isfinite(pull):
                 path = f"cables.{scene.structure.planes[plane]}.{name}"
                 found.setdefault(f"{pull:.4g} N", []).append(path)
-    return "; ".join(f"{' and '.join(each)} pull at most {most}" for most, each in found.items())
+    return "; ".join(
+        f"{' and '.join(each)} pull{'s' * (len(each) == 1)} at most {most}"
+        for most, each in found.items()
+    )
 
 
 def _layout(scene: Scene) -> dict[str, str]:

@@ -142,9 +142,12 @@ class Motors(Output):
             if motor.speed is not None:
                 command = motor.commanded(times - winch.start_time)[0]
                 late = runs & (speed / motor.travel < (1.0 - _LAGS) * command)
-                # Up to the end of a step at which it is switched off it is as at its beginning.
-                late, until = late[before], np.where(runs[steps], late[steps], late[before])
-                lagged[place] = 0.5 * during * runs[before] * (1.0 * late + until)
+                # Up to the end of a step at which it is switched off it is as at its beginning; a
+                # shaft without inertia that starts is in its first step as at the step's end.
+                first = motor.rotor_inertia is None and times <= winch.start_time + AT_ONCE
+                until = np.where(runs[steps], late[steps], late[before])
+                since = np.where((runs & first)[before] & runs[steps], until, late[before])
+                lagged[place] = 0.5 * during * runs[before] * (1.0 * since + until)
             if motor.torque_constant is not None:
                 takes = motor.electrical_power(given, speed / motor.travel)
                 current[place] = np.where(
@@ -171,6 +174,8 @@ class Motors(Output):
             known = np.isfinite(lagged).any(axis=0)
             lag = np.where(known, np.nansum(lagged, axis=0), np.nan)
             values |= {"motor_lag_duration": lag, "longest_motor_lag": np.nanmax(lag)}
+        else:  # nothing is commanded
+            values["longest_motor_lag"] = 0.0
         return values
 
 
@@ -267,7 +272,7 @@ class DriveMargins(Output):
         Variable(
             "least_drive_margin_started", (), "1",
             "smallest static margin of the drive at any angle passed from the start of the last "
-            "winch on; NaN of runs that ended before",
+            "winch on; of runs that ended before, that of the whole run",
             needs=SEVERAL, worse="smaller",
         ),
         Variable(

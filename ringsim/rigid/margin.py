@@ -319,13 +319,14 @@ def with_margin(
             margin[own] = [min(one.margin, MOST) for one in rows]
             resisting[:, own] = [[one.resisting.get(kind, 0.0) for one in rows] for kind in kinds]
             known = list(zip(clock, rows, strict=True))
-            full, end = drive.conditions.started, drive.conditions.end
+            end = drive.conditions.end
             if begin < end:
                 leasts.append(least_along(drive, way.between(begin, until), known))
-            if max(begin, full) < min(until, end, way.times[-1]):
-                late = full > way.times[0] + AT_ONCE
-                stretch = way.between(max(begin, full), until)
-                started.append(least_along(drive, stretch, known) if late else leasts[-1])
+            # What an earlier scene had, before a winch of the last one starts, is before its start.
+            on = max(begin, drive.conditions.started, last.conditions.started)
+            if on < min(until, end, way.times[-1]):
+                since = [(time, one) for time, one in known if time >= on - AT_ONCE]
+                started.append(least_along(drive, way.between(on, until), since))
         begin = until
     values = {"drive_available": available, "drive_resistance": resisting, "drive_margin": margin}
     reason = outcome.reason
@@ -337,11 +338,13 @@ def with_margin(
             "least_drive_margin_time": np.asarray(least.time),
             "least_drive_margin_angle": np.asarray(math.degrees(least.angle)),
         }
-    if started and len(last.conditions.winches) > 1:
-        values |= {
-            "least_drive_margin_started": np.asarray(min(started).margin),
-            "least_drive_margin_started_angle": np.asarray(math.degrees(min(started).angle)),
-        }
+        if len(last.conditions.winches) > 1:
+            # Of a ring that was open, or stuck, before: what drove it then.
+            then = min(started, default=least)
+            values |= {
+                "least_drive_margin_started": np.asarray(then.margin),
+                "least_drive_margin_started_angle": np.asarray(math.degrees(then.angle)),
+            }
     by_plane = _by_plane(outcome, drives)
     if np.isfinite(by_plane).any():
         values["least_drive_margin_plane"] = by_plane

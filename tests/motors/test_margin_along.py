@@ -260,13 +260,26 @@ def test_the_margin_from_the_start_of_the_last_winch_on() -> None:
     assert found["least_drive_margin_started"] == pytest.approx(
         virtual_work(BOTH, math.radians(min(at, 179.99))), abs=2e-3 * abs(best) + 1e-6
     )
-    # Of a run that ended before, and of one winch alone, there is none.
+    # Of a run that ended before it is that of the whole run; of one winch alone there is none.
     short = opened(0.05, lock=math.nan)
-    for name in ("opening_angle",):
-        short.values[name][:, :, 8:] = np.nan
-    assert "least_drive_margin_started" not in with_margin(short, ring(**late)).values
+    short.values["opening_angle"][:, :, 8:] = np.nan
+    ended = with_margin(short, ring(**late)).values
+    assert ended["least_drive_margin_started"] == ended["least_drive_margin"]
     single = with_margin(opened(0.05), ring(**plain, cables__lower="none")).values
     assert "least_drive_margin_started" not in single
+    # What was passed before all winches started, at once or the only one that ever does, is before.
+    equal = plain | {f"cables__{plane}__winch__start_time": 0.5 for plane in PLANES}
+    whole = with_margin(opened(0.05), ring(**equal)).values
+    assert whole["least_drive_margin_started"] == pytest.approx(best, rel=2e-2)
+    alone = late | {"cables__upper__winch__stop_time": 0.0}
+    lone = with_margin(opened(0.05), ring(**alone)).values["least_drive_margin_started"]
+    best_alone = min(virtual_work(ONE, math.radians(a)) for a in np.linspace(90.0, 179.9, 50))
+    assert lone == pytest.approx(best_alone, rel=2e-2)
+    # A winch that starts after a restart: nothing of the scene before counts.
+    later = plain | {"cables__lower__winch__start_time": 0.8}
+    after = with_margin(opened(0.05), ring(**later), [(0.5, ring(**plain))]).values
+    from_there = min(virtual_work(BOTH, math.radians(a)) for a in np.linspace(136.8, 179.9, 50))
+    assert after["least_drive_margin_started"] == pytest.approx(from_there, rel=2e-2)
     # A scene before that had its second winch late counts up to the restart.
     both = with_margin(opened(0.05), ring(**plain), [(0.6, ring(**late))]).values
     assert both["least_drive_margin_started"] == pytest.approx(

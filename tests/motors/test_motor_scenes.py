@@ -221,6 +221,13 @@ def test_motors_tell_how_long_they_were_slower_than_commanded(fidelity: str) -> 
     plain = {f"cables.{p}.winch.winding": MOTOR for p in ("upper", "lower")}
     without = simulate(scene.with_values(plain | {"solver.end_time": 0.1}), "frame")
     assert np.isnan(without.motor_lag_duration).all()  # nothing is commanded
+    assert without.longest_motor_lag == 0.0
+    # One that has its torque at once never lags, not in its first step either.
+    strong = MOTOR | {"speed": 100.0, "stall_torque": 0.02}
+    free = {f"cables.{p}.winch.winding": strong for p in ("upper", "lower")}
+    free |= {"joints.vjoint.coulomb": 0.0, "cables.upper.winch.start_time": 0.05}
+    found = simulate(scene.with_values(free | {"solver.end_time": 0.2}), "frame")
+    assert (found.motor_lag_duration == 0.0).all()
 
 
 def test_a_ramp_takes_the_jump_from_the_first_steps() -> None:
