@@ -10,6 +10,7 @@ import xarray as xr
 from ring_rods import RODS
 
 from ringsim.dataset import to_dataset
+from ringsim.plots import style
 from ringsim.scene import Scene, scene_from_table
 from ringsim.variables import PLANES, Fate, Outcome, Status
 
@@ -114,3 +115,15 @@ def failed() -> xr.Dataset:
 @pytest.fixture(scope="session")
 def unfinished() -> xr.Dataset:
     return _made_run(_scene_of(2, closed=False), until=12.0)
+
+
+@pytest.fixture
+def settled() -> None:
+    """Words inside axes move to where they cover least, as for users."""
+
+
+@pytest.fixture(autouse=True)
+def _words_stay(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To find the layout costs half of a figure; whoever looks at places asks for ``settled``."""
+    if "settled" not in request.fixturenames:
+        monkeypatch.setattr(style, "settle", lambda figure: None)

@@ -235,6 +235,7 @@ def test_limits_of_loads_are_drawn_and_within_the_axes(deployed, scene_of):
     assert not any("limits." in text.get_text() for text in rod_stress(deployed).findobj(Text))
 
 
+@pytest.mark.usefixtures("settled")
 def test_names_of_panels_leave_the_words_of_limits_free(deployed, scene_of):
     """Wherever the limit is: near the top of the axes the corner is taken."""
     for limit in (2e6, 9e6, 1e8):
@@ -304,6 +305,7 @@ def test_energies_are_drawn_in_the_unit_of_the_label(drawn, deployed):
     assert "2.3e-05" in lower.get_title(loc="left")
 
 
+@pytest.mark.usefixtures("settled")
 @pytest.mark.parametrize(
     ("sections", "closed"), [(1, False), pytest.param(6, True, marks=pytest.mark.slow), (72, True)]
 )
@@ -345,6 +347,7 @@ def test_runs_that_ended_early_are_drawn_as_far_as_they_got(tmp_path, failed, un
     assert len(draw_figures(unfinished, tmp_path)) == len(OF_RINGS)
 
 
+@pytest.mark.usefixtures("settled")
 def test_a_single_record_can_be_drawn(tmp_path, scene_of, made_run):
     run = made_run(scene_of(6), status=Status.DIVERGED, until=0.01)
     assert len(draw_figures(run, tmp_path)) == len(OF_RINGS)
@@ -383,6 +386,7 @@ def test_importing_the_figures_changes_no_global_setting():
     assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.usefixtures("settled")
 def test_a_long_ending_stands_clear_of_what_is_above_the_axes(deployed):
     """Words of the lock above the right end of the axes, and the second line of the ending."""
     long = deployed.assign(outcome=int(Fate.OVERLOADED))
@@ -443,6 +447,7 @@ def test_a_figure_is_one_entry(deployed: xr.Dataset, monkeypatch: pytest.MonkeyP
     assert next(figures_of(deployed))[0] is made
 
 
+@pytest.mark.usefixtures("settled")
 @pytest.mark.parametrize("told", [r"$\frac{$", "\x1b[31mred", "x" * 200_000])
 def test_words_of_a_file_are_drawn_whatever_they_are(deployed: xr.Dataset, told: str) -> None:
     """No formula that matplotlib refuses, no letter without a sign, no end of layout."""
