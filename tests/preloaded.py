@@ -1,6 +1,6 @@
-"""Commands of ringsim without the two seconds that each process would spend on imports.
+"""Commands and scripts without the two seconds that each process would spend on imports.
 
-A process that has loaded all modules forks for each command, and a command forks its solver
+A process that has loaded all modules forks for each of them, and these fork their solver
 processes.  Folder, environment, exit code and what is printed are those of a fresh process.  Tests
 of how a process starts, of what it loads, of signals and of MPI start real ones.
 """
@@ -23,6 +23,7 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,14 +39,28 @@ def ringsim(
 ) -> subprocess.CompletedProcess[str]:  # fmt: skip
     """As ``python -m ringsim ARGUMENTS`` in a folder; ``joined`` has stderr within stdout."""
     words = [str(each) for each in arguments]
+    return _called("", words, folder or Path.cwd(), environment, joined, timeout)
+
+
+def script(
+    path: Path, *, folder: Path, timeout: float = 600.0
+) -> subprocess.CompletedProcess[str]:  # fmt: skip
+    """As ``python -W error PATH`` in a folder."""
+    return _called(str(path), [], folder, None, False, timeout)
+
+
+def _called(
+    path: str, words: list[str], folder: Path, environment: dict[str, str] | None, joined: bool,
+    timeout: float,
+) -> subprocess.CompletedProcess[str]:  # fmt: skip
     with tempfile.TemporaryDirectory() as place:
         order = {
-            "arguments": words, "folder": str(folder or Path.cwd()), "joined": joined,
+            "script": path, "arguments": words, "folder": str(folder), "joined": joined,
             "environment": dict(environment or os.environ), "place": place,
         }  # fmt: skip
         code = _asked(order, timeout)
         told = [Path(place, name).read_text(encoding="utf-8") for name in ("out", "err")]
-    return subprocess.CompletedProcess(["ringsim", *words], code, *told)
+    return subprocess.CompletedProcess([path or "ringsim", *words], code, *told)
 
 
 def _asked(order: dict[str, object], timeout: float) -> int:
@@ -90,9 +105,19 @@ def _serve() -> None:
         order = json.loads(line)
         if (child := os.fork()) == 0:
             _become(order)
-            _run(lambda: runpy.run_module("ringsim", run_name="__main__", alter_sys=True))
+            _run(_script if order["script"] else _command)
         print(child, flush=True)
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
+def _command() -> None:
+    runpy.run_module("ringsim", run_name="__main__", alter_sys=True)
+
+
+def _script() -> None:
+    warnings.resetwarnings()
+    warnings.simplefilter("error")
+    runpy.run_path(sys.argv[0], run_name="__main__")
 
 
 def _run(main: Callable[[], object]) -> None:
@@ -100,6 +125,7 @@ def _run(main: Callable[[], object]) -> None:
     code = 1
     try:
         main()
+        code = 0
     except SystemExit as left:
         code = left.code if isinstance(left.code, int) else 0
     except BaseException:
@@ -126,8 +152,9 @@ def _become(order: dict[str, object]) -> None:
     os.chdir(str(order["folder"]))
     paths = [path for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]
     rest = [path for path in sys.path[1:] if path not in paths]
-    sys.path[:] = [os.getcwd(), *paths, *rest]
-    sys.argv = ["ringsim", *order["arguments"]]
+    script = str(order["script"])
+    sys.path[:] = [str(Path(script).parent) if script else os.getcwd(), *paths, *rest]
+    sys.argv = [script or "ringsim", *order["arguments"]]
     slot = importlib.import_module("ringsim.execution.slot")
     names = {"DEVNULL": subprocess.DEVNULL, "TimeoutExpired": subprocess.TimeoutExpired}
     slot.__dict__["subprocess"] = SimpleNamespace(Popen=_Solver, **names)
