@@ -43,10 +43,11 @@ def ringsim(
 
 
 def script(
-    path: Path, *, folder: Path, timeout: float = 600.0
+    path: Path, *arguments: object, folder: Path, timeout: float = 600.0
 ) -> subprocess.CompletedProcess[str]:  # fmt: skip
-    """As ``python -W error PATH`` in a folder."""
-    return _called(str(path), [], folder, None, False, timeout)
+    """As ``python -W error PATH ARGUMENTS`` in a folder."""
+    words = [str(each) for each in arguments]
+    return _called(str(path), words, folder, None, False, timeout)
 
 
 def _called(
