@@ -250,6 +250,7 @@ def test_names_of_panels_leave_the_words_of_limits_free(deployed, scene_of):
                     assert not box.overlaps(told.get_window_extent())
 
 
+@pytest.mark.usefixtures("settled")
 def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
     figure = Figure()
     axes = figure.subplots()
@@ -265,6 +266,7 @@ def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
         assert float(tick.get_text()) == pytest.approx(1e-6 * place)
 
 
+@pytest.mark.usefixtures("settled")
 def test_a_vertical_axis_without_a_name_has_the_unit_of_its_panel_s_title():
     figure = Figure()
     stress, force, share = figure.subplots(1, 3)
@@ -347,7 +349,6 @@ def test_runs_that_ended_early_are_drawn_as_far_as_they_got(tmp_path, failed, un
     assert len(draw_figures(unfinished, tmp_path)) == len(OF_RINGS)
 
 
-@pytest.mark.usefixtures("settled")
 def test_a_single_record_can_be_drawn(tmp_path, scene_of, made_run):
     run = made_run(scene_of(6), status=Status.DIVERGED, until=0.01)
     assert len(draw_figures(run, tmp_path)) == len(OF_RINGS)
