@@ -1,8 +1,9 @@
 """Commands and scripts without the two seconds that each process would spend on imports.
 
 A process that has loaded all modules forks for each of them, and these fork their solver
-processes.  Folder, environment, exit code and what is printed are those of a fresh process.  Tests
-of how a process starts, of what it loads, of signals and of MPI start real ones.
+processes.  Folder, environment, exit code and what is printed are those of a fresh process, and
+signals reach it alike.  Tests of how a process starts, of what it loads, of kills of any process
+and of MPI start real ones.
 """
 
 from __future__ import annotations

@@ -152,7 +152,7 @@ def test_the_tutorial_takes_five_commands(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "campaigns").symlink_to(ROOT / "campaigns")
     printed = []
     for verb, *arguments in commands:
-        smaller = ["--samples=3", "--set=structure.sections=3", "--workers=1"]
+        smaller = ["--samples=3", "--set=structure.sections=3", "--workers=0"]
         if verb == "campaign":
             arguments = [each for each in arguments if each != "--plot"] + smaller
         if verb == "replay":  # which hands its own output to the sample's process
