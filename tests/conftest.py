@@ -1,10 +1,13 @@
 """Settings that all tests share."""
 
 import gc
+import os
 
 from ringsim.threads import one_thread_from_here_on
 
 one_thread_from_here_on()  # as the command does, before numpy is loaded
+# Each process would look through all that is installed for what nobody has: a tenth of its start.
+os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
 
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402

@@ -1,8 +1,9 @@
-"""Commands of ringsim without the two seconds that each process would spend on imports.
+"""Commands and scripts without the two seconds that each process would spend on imports.
 
-A process that has loaded all modules forks for each command, and a command forks its solver
-processes.  Folder, environment, exit code and what is printed are those of a fresh process.  Tests
-of how a process starts, of what it loads, of signals and of MPI start real ones.
+A process that has loaded all modules forks for each of them, and these fork their solver
+processes.  Folder, environment, exit code and what is printed are those of a fresh process, and
+signals reach it alike.  Tests of how a process starts, of what it loads, of kills of any process
+and of MPI start real ones.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,22 +40,93 @@ def ringsim(
 ) -> subprocess.CompletedProcess[str]:  # fmt: skip
     """As ``python -m ringsim ARGUMENTS`` in a folder; ``joined`` has stderr within stdout."""
     words = [str(each) for each in arguments]
+    return _called("", words, folder or Path.cwd(), environment, joined, timeout)
+
+
+def script(
+    path: Path, *arguments: object, folder: Path, timeout: float = 600.0
+) -> subprocess.CompletedProcess[str]:  # fmt: skip
+    """As ``python -W error PATH ARGUMENTS`` in a folder."""
+    words = [str(each) for each in arguments]
+    return _called(str(path), words, folder, None, False, timeout)
+
+
+class Started:
+    """A command that runs while others do, with both outputs joined, as a process that
+    ``subprocess.Popen`` has started in a session of its own.
+    """
+
+    def __init__(self, *arguments: object, folder: Path, environment: dict[str, str]) -> None:
+        self._place = tempfile.TemporaryDirectory()
+        self.returncode: int | None = None
+        self._printed: str | None = None
+        self.pid = int(_told(started=True, **_order(
+            "", list(map(str, arguments)), folder, environment, True, self._place.name,
+        )))  # fmt: skip
+
+    def poll(self) -> int | None:
+        """Its exit code, None while it runs."""
+        if self.returncode is None and (told := _told(ended=self.pid)) != "not yet":
+            self.returncode = int(told)
+        return self.returncode
+
+    def communicate(self, timeout: float = 300.0) -> tuple[str, None]:
+        """What it has printed when it has ended."""
+        end = time.monotonic() + timeout
+        while self.poll() is None:
+            if time.monotonic() > end:
+                raise subprocess.TimeoutExpired(str(self.pid), timeout)
+            time.sleep(0.01)
+        if self._printed is None:
+            self._printed = Path(self._place.name, "out").read_text(encoding="utf-8")
+            self._place.cleanup()
+        return self._printed, None
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+    def close(self) -> None:
+        """End it if it still runs."""
+        self.kill()
+        self.communicate()
+
+
+def _order(
+    path: str, words: list[str], folder: Path, environment: dict[str, str] | None, joined: bool,
+    place: str,
+) -> dict[str, object]:  # fmt: skip
+    return {
+        "script": path, "arguments": words, "folder": str(folder), "joined": joined,
+        "environment": dict(environment or os.environ), "place": place,
+    }  # fmt: skip
+
+
+def _called(
+    path: str, words: list[str], folder: Path, environment: dict[str, str] | None, joined: bool,
+    timeout: float,
+) -> subprocess.CompletedProcess[str]:  # fmt: skip
     with tempfile.TemporaryDirectory() as place:
-        order = {
-            "arguments": words, "folder": str(folder or Path.cwd()), "joined": joined,
-            "environment": dict(environment or os.environ), "place": place,
-        }  # fmt: skip
-        code = _asked(order, timeout)
+        code = _asked(_order(path, words, folder, environment, joined, place), timeout)
         told = [Path(place, name).read_text(encoding="utf-8") for name in ("out", "err")]
-    return subprocess.CompletedProcess(["ringsim", *words], code, *told)
+    return subprocess.CompletedProcess([path or "ringsim", *words], code, *told)
 
 
-def _asked(order: dict[str, object], timeout: float) -> int:
+def _told(**order: object) -> str:
+    """What the server answers at once."""
     server = _server()
     assert server.stdin is not None
     assert server.stdout is not None
     server.stdin.write(json.dumps(order).encode() + b"\n")
-    child = int(server.stdout.readline())
+    return server.stdout.readline().decode().strip()
+
+
+def _asked(order: dict[str, object], timeout: float) -> int:
+    child, server = int(_told(**order)), _server()
+    assert server.stdout is not None
     late = not select.select([server.stdout], [], [], timeout)[0]
     if late:
         os.kill(child, signal.SIGKILL)
@@ -88,11 +161,28 @@ def _serve() -> None:
     gc.freeze()  # pages that forks would otherwise copy
     for line in sys.stdin:
         order = json.loads(line)
+        if "ended" in order:
+            found, status = os.waitpid(order["ended"], os.WNOHANG)
+            print(os.waitstatus_to_exitcode(status) if found else "not yet", flush=True)
+            continue
         if (child := os.fork()) == 0:
+            if "started" in order:
+                os.setsid()
             _become(order)
-            _run(lambda: runpy.run_module("ringsim", run_name="__main__", alter_sys=True))
+            _run(_script if order["script"] else _command)
         print(child, flush=True)
-        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+        if "started" not in order:
+            print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
+def _command() -> None:
+    runpy.run_module("ringsim", run_name="__main__", alter_sys=True)
+
+
+def _script() -> None:
+    warnings.resetwarnings()
+    warnings.simplefilter("error")
+    runpy.run_path(sys.argv[0], run_name="__main__")
 
 
 def _run(main: Callable[[], object]) -> None:
@@ -100,6 +190,7 @@ def _run(main: Callable[[], object]) -> None:
     code = 1
     try:
         main()
+        code = 0
     except SystemExit as left:
         code = left.code if isinstance(left.code, int) else 0
     except BaseException:
@@ -126,8 +217,9 @@ def _become(order: dict[str, object]) -> None:
     os.chdir(str(order["folder"]))
     paths = [path for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]
     rest = [path for path in sys.path[1:] if path not in paths]
-    sys.path[:] = [os.getcwd(), *paths, *rest]
-    sys.argv = ["ringsim", *order["arguments"]]
+    script = str(order["script"])
+    sys.path[:] = [str(Path(script).parent) if script else os.getcwd(), *paths, *rest]
+    sys.argv = [script or "ringsim", *order["arguments"]]
     slot = importlib.import_module("ringsim.execution.slot")
     names = {"DEVNULL": subprocess.DEVNULL, "TimeoutExpired": subprocess.TimeoutExpired}
     slot.__dict__["subprocess"] = SimpleNamespace(Popen=_Solver, **names)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
@@ -128,4 +129,22 @@ def write_figure(
 def write(figure: Figure, path: Path) -> None:
     """Write a file of the kind that its name tells: png, svg or pdf; whole, or not at all."""
     with whole(path, lasting=False) as draft:
-        figure.savefig(draft, format=path.suffix[1:])
+        if path.suffix == ".png":
+            _write_png(figure, draft)
+        else:
+            figure.savefig(draft, format=path.suffix[1:])
+
+
+def _write_png(figure: Figure, path: Path) -> None:
+    """As ``savefig``, which draws a figure twice that has a layout to find: found before, once."""
+    engine, before = figure.get_layout_engine(), figure.dpi
+    if engine is not None:
+        figure.set_dpi(matplotlib.rcParams["savefig.dpi"])
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    try:
+        figure.savefig(path, format="png")
+    finally:
+        if engine is not None:
+            figure.set_layout_engine(engine)
+            figure.set_dpi(before)

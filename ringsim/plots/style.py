@@ -48,7 +48,10 @@ def settle(figure: Figure) -> None:
     """Move free words of a drawn figure to where they cover least, best of all nothing."""
     movable = [(a, [t for t in a.texts if t.get_gid() == FREE]) for a in figure.axes]
     if any(texts for _, texts in movable):
-        figure.draw_without_rendering()  # settles the layout, on which positions depend
+        if (engine := figure.get_layout_engine()) is None:
+            figure.draw_without_rendering()
+        else:  # positions depend on the layout alone
+            engine.execute(figure)
     for axes, texts in movable:
         curves = list(_curves(axes))
         fixed = (t for t in axes.texts if t.get_gid() != FREE and t.get_visible() and t.get_text())

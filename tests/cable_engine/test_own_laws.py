@@ -7,12 +7,11 @@ stay known as long as it runs, therefore it is a process of its own.
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import preloaded
 import pytest
 
 LAWS = Path(__file__).parent / "own_laws"
@@ -36,7 +35,7 @@ SPEED, PERIOD, EFFICIENCY = 0.05, 0.8, 0.95
 
 
 @pytest.fixture(scope="module")
-def found() -> dict[str, Any]:
+def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     values: dict[str, Any] = {
         "structure.opening_angle": 60.0,
         "record.interval": 0.05,
@@ -46,8 +45,9 @@ def found() -> dict[str, Any]:
         winding = {"kind": "pulsating", "speed": SPEED, "period": PERIOD}
         friction = {"kind": "sheave-efficiency", "efficiency": EFFICIENCY}
         values |= {f"cables.{cable}.winch.winding": winding, f"cables.{cable}.friction": friction}
-    command = [sys.executable, "-c", RUN, str(LAWS), json.dumps(values)]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    file = tmp_path_factory.mktemp("laws") / "run.py"
+    file.write_text(RUN, encoding="utf-8")
+    result = preloaded.script(file, LAWS, json.dumps(values), folder=file.parent)
     assert result.returncode == 0, result.stderr
     answer: dict[str, Any] = json.loads(result.stdout)
     return answer

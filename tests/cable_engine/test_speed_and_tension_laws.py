@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import functools
 import json
-import subprocess
-import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import preloaded
 import pytest
 
 RUN = """
@@ -55,8 +55,11 @@ FRICTIONS: dict[str, dict[str, Any]] = {
 @functools.cache
 def ran(name: str, *engines: str) -> dict[str, Any]:
     laws = str(Path(__file__).parent / "own_laws")
-    command = [sys.executable, "-c", RUN, laws, json.dumps(FRICTIONS[name]), *engines]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "run.py"
+        file.write_text(RUN, encoding="utf-8")
+        words = [laws, json.dumps(FRICTIONS[name]), *engines]
+        result = preloaded.script(file, *words, folder=file.parent)
     assert result.returncode == 0, result.stderr
     answer: dict[str, Any] = json.loads(result.stdout)
     return answer

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import xarray as xr
-from preloaded import ringsim
+from preloaded import Started, ringsim
 
 from ringsim.campaign.folder import open_folder
 from ringsim.storage.journal import Journal, read_journal
@@ -78,7 +78,7 @@ class Bench:
 
     folder: Path
     extra: dict[str, str] = field(default_factory=dict)
-    processes: list[subprocess.Popen] = field(default_factory=list)
+    processes: list[subprocess.Popen | Started] = field(default_factory=list)
 
     def write(self, samples=20, *, shared="", inputs="", more="", name="small.toml"):
         path = self.folder / name
@@ -105,18 +105,27 @@ class Bench:
     def environment(self):
         return os.environ | {"PYTHONPATH": MODULES} | self.extra
 
-    def start(self, *arguments, ranks=0, solver="fake_solver:run"):
-        process = subprocess.Popen(
-            self.command(*arguments, ranks=ranks, solver=solver),
-            cwd=self.folder, env=self.environment(), text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
-        )  # fmt: skip
+    def start(self, *arguments, ranks=0, solver="fake_solver:run", fresh=False):
+        """A process that goes on; ``fresh`` starts one that has loaded nothing."""
+        command = self.command(*arguments, ranks=ranks, solver=solver)
+        environment = self.environment()
+        if ranks or fresh:
+            process = subprocess.Popen(
+                command, cwd=self.folder, env=environment, text=True,
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
+            )  # fmt: skip
+        else:
+            words = command[len(PYTHON) :]
+            process = Started(*words, folder=self.folder, environment=environment)
         self.processes.append(process)
         return process
 
     def close(self):
         """End what is still running, and close the pipes of what has ended, too."""
         for process in self.processes:
+            if isinstance(process, Started):
+                process.close()
+                continue
             if process.poll() is None:
                 process.kill()
                 process.communicate()

@@ -48,7 +48,7 @@ class Drill:
         while todo:
             if self.process is None:
                 self.process = self.bench.start(
-                    *self.command, ranks=self.ranks, solver="fake_solver:traced"
+                    *self.command, ranks=self.ranks, solver="fake_solver:traced", fresh=True
                 )
             wanted = self.solved() + self.chance.randint(1, 40)
             assert until(

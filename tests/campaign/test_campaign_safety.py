@@ -189,7 +189,7 @@ reaches all ranks below."""
 @pytest.mark.parametrize("number", [signal.SIGTERM, *OTHERS])
 def test_stop_signal_ends_the_campaign_and_it_goes_on_later(number, bench):
     start = ("campaign", bench.write(40, **SLEEPY), "--workers", 2, "--out", "out")
-    process = bench.start(*start, solver="fake_solver:slow")
+    process = bench.start(*start, solver="fake_solver:slow", fresh=True)
     wait_until_some_are_done(bench, process)
     process.send_signal(number)
     printed, _ = process.communicate(timeout=60)

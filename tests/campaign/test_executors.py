@@ -13,7 +13,6 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import xarray as xr
 
@@ -41,7 +40,7 @@ from distributed import Client, LocalCluster
 if __name__ == "__main__":
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with Client(cluster) as client:
-            made().run(3, out="o", executor=client.get_executor())
+            growing().run(2, out="parts", executor=client.get_executor())
 """
 NAMES: dict[str, Any] = {}
 exec(textwrap.dedent(MADE), NAMES)
@@ -71,14 +70,7 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 def require_same(folder: Path, known: xr.Dataset) -> None:
     found = comparable(ringsim.open_campaign(folder))
     xr.testing.assert_equal(found.drop_attrs(), known.drop_attrs())
-    assert len(list((folder / "journals").iterdir())) == 3  # one a part
-
-
-def test_processes_give_what_workers_give(tmp_path: Path, known: xr.Dataset) -> None:
-    with ProcessPoolExecutor(2) as pool:
-        found = made().run(3, out=tmp_path / "o", executor=pool)
-    xr.testing.assert_equal(comparable(found).drop_attrs(), known.drop_attrs())
-    require_same(tmp_path / "o", known)
+    assert len(list((folder / "journals").iterdir())) == 2  # one a part
 
 
 @pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: ringsim[mpich]")
@@ -88,17 +80,10 @@ def test_ranks_of_mpi_give_what_workers_give(tmp_path: Path, known: xr.Dataset) 
         from mpi4py.futures import MPIPoolExecutor
         if __name__ == "__main__":
             with MPIPoolExecutor() as pool:
-                made().run(3, out="o", executor=pool)
+                made().run(2, out="o", executor=pool)
         """,
         tmp_path, str(MPIEXEC), "-n", "3", sys.executable, "-m", "mpi4py.futures",
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    require_same(tmp_path / "o", known)
-
-
-def test_a_dask_cluster_gives_what_workers_give(tmp_path: Path, known: xr.Dataset) -> None:
-    pytest.importorskip("distributed")
-    done = in_a_script(DASK, tmp_path, sys.executable)
     assert done.returncode == 0, done.stderr
     require_same(tmp_path / "o", known)
 
@@ -114,12 +99,12 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path, known: xr.Dataset) -> Non
 
     with ProcessPoolExecutor(2) as pool, ThreadPoolExecutor(1) as other:
         killed = other.submit(kill, pool)
-        with pytest.raises(CampaignError, match=r"part \d/3 was lost .*: call again"):
-            made().run(3, out=tmp_path / "o", executor=pool)
+        with pytest.raises(CampaignError, match=r"part \d/2 was lost .*: call again"):
+            made().run(2, out=tmp_path / "o", executor=pool)
         killed.result()
     before = {each: each.stat().st_size for each in (tmp_path / "o" / "journals").iterdir()}
     with ProcessPoolExecutor(2) as pool:
-        found = made().run(3, out=tmp_path / "o", executor=pool)
+        found = made().run(2, out=tmp_path / "o", executor=pool)
     xr.testing.assert_equal(comparable(found).drop_attrs(), known.drop_attrs())
     assert all(each.exists() and each.stat().st_size >= size for each, size in before.items())
 
@@ -134,7 +119,7 @@ def growing():
     return ringsim.Campaign(
         "ring18",
         {"loads.force": {"kind": "lognormal", "mean": 0.02, "standard_deviation": 0.004}},
-        {"kind": "subset-simulation", "of": "deployment_time", "above": 15.5, "samples": 20,
+        {"kind": "subset-simulation", "of": "deployment_time", "above": 14.9, "samples": 20,
          "share": 0.5, "replicates": 2},
         fidelity="full", set={"structure.sections": 6, "boom": "none", "net": "none",
                               "solver.end_time": 30.0},
@@ -142,26 +127,20 @@ def growing():
 """
 
 
-@pytest.mark.parametrize("kind", ["threads", "dask"])
-def test_a_design_that_grows_goes_on_from_level_to_level(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+def test_a_design_that_grows_goes_on_from_level_to_level_on_a_dask_cluster(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each level is another round of tasks; dask would take equal ones for those of the last."""
+    pytest.importorskip("distributed")
     monkeypatch.setitem(SOLVERS, "full", SOLVERS["full"])  # as it is now, again in the end
     names: dict[str, Any] = {}
     exec(GROWING, names)
-    known = names["growing"]().run(workers=0, out=tmp_path / "alone")
-    if kind == "threads":
-        with ThreadPoolExecutor(2) as pool:
-            names["growing"]().run(2, out=tmp_path / "parts", executor=pool)
-    else:
-        pytest.importorskip("distributed")
-        text = GROWING + DASK.replace('made().run(3, out="o"', 'growing().run(2, out="parts"')
-        done = in_a_script(text, tmp_path, sys.executable)
-        assert done.returncode == 0, done.stderr
-    found = ringsim.open_campaign(tmp_path / "parts")
+    known = comparable(names["growing"]().run(workers=0, out=tmp_path / "alone"))
+    done = in_a_script(GROWING + DASK, tmp_path, sys.executable)
+    assert done.returncode == 0, done.stderr
+    found = comparable(ringsim.open_campaign(tmp_path / "parts"))
     assert found.sizes["sample"] == known.sizes["sample"] > 40
-    np.testing.assert_array_equal(found["deployment_time"], known["deployment_time"])
+    xr.testing.assert_equal(found.drop_attrs(), known.drop_attrs())
 
 
 def test_failures_of_all_parts_count_together(

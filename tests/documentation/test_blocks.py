@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import re
 import shlex
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
+import preloaded
 import pytest
 from click.testing import CliRunner
 from loops import for_each
@@ -135,16 +134,9 @@ scene = ringsim.load_scene("ring18").with_values(ring)
 def script(page: Path, folder: Path, text: str, *, code: int = 0) -> str:
     """What the text of ``page`` has printed as a script that treats warnings as errors."""
     (folder / f"{page.stem}.py").write_text(text, encoding="utf-8")
-    command = [sys.executable, "-W", "error", f"{page.stem}.py"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    done = preloaded.script(folder / f"{page.stem}.py", folder=folder)
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout + done.stderr
-
-
-def run(command: list[str], folder: Path) -> str:
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 def test_the_tutorial_takes_five_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,11 +152,13 @@ def test_the_tutorial_takes_five_commands(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "campaigns").symlink_to(ROOT / "campaigns")
     printed = []
     for verb, *arguments in commands:
-        smaller = ["--samples=3", "--set=structure.sections=3", "--workers=1"]
+        smaller = ["--samples=3", "--set=structure.sections=3", "--workers=0"]
         if verb == "campaign":
             arguments = [each for each in arguments if each != "--plot"] + smaller
         if verb == "replay":  # which hands its own output to the sample's process
-            printed.append(run([sys.executable, "-m", "ringsim", verb, *arguments], tmp_path))
+            replayed = preloaded.ringsim(verb, *arguments, folder=tmp_path)
+            assert replayed.returncode == 0, replayed.stderr
+            printed.append(replayed.stdout)
             continue
         done = CliRunner().invoke(cli, [verb, *arguments])
         assert done.exit_code == 0, done.output
@@ -184,8 +178,7 @@ def test_the_tutorial_takes_twelve_lines_of_python(tmp_path: Path) -> None:
     smaller = text.replace('"structure.sections": 6', '"structure.sections": 3')
     smaller = smaller.replace('"samples": 24', '"samples": 2')
     assert smaller.count("3,") == text.count("3,") + 1
-    (tmp_path / "study.py").write_text(smaller, encoding="utf-8")
-    printed = run([sys.executable, "study.py"], tmp_path)
+    printed = script(Path("study"), tmp_path, smaller)
     assert re.search(r"^deployed +2 +2 ", printed, re.MULTILINE)
     names: dict[str, object] = {}
     exec(text.partition("campaign = ")[0], names)
@@ -198,8 +191,7 @@ def test_the_tutorial_takes_twelve_lines_of_python(tmp_path: Path) -> None:
 def test_the_list_of_printed_texts_has_them_with_their_values_and_what_explain_and_help_say() -> (
     None
 ):
-    command = [sys.executable, ROOT / "docs" / "printed_texts.py"]
-    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    listed = preloaded.script(ROOT / "docs" / "printed_texts.py", folder=ROOT).stdout
     assert "no significant input for {', '.join(quiet)}" in listed
     assert "## ringsim/report/page.html.j2" in listed
     lines = {line.partition(": ")[2] for line in listed.splitlines()}

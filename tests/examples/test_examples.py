@@ -4,27 +4,31 @@ from __future__ import annotations
 
 import ast
 import re
-import subprocess
-import sys
 from pathlib import Path
 
+import preloaded
 import pytest
 from loops import for_each
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 TOGETHER = ("campaign", "analysis")
+SMALLER = (
+    ("samples = 16", "samples = 4"),
+    ('sections" = 6', 'sections" = 3'),
+    ('"--workers", "2"', '"--workers", "0"'),
+)
 ALONE = [(path.stem,) for path in EXAMPLES if path.stem not in TOGETHER]
 
 
 @pytest.mark.parametrize("scripts", [TOGETHER, *ALONE], ids="-".join)
 def test_an_example_runs(scripts: tuple[str, ...], tmp_path: Path) -> None:
     """One that runs another one first finds in the same folder what that has done; of the samples
-    of a campaign four run, of a small ring.
+    of a campaign four run, of a small ring, in one process.
     """
     for script in scripts:
         text = (ROOT / "examples" / f"{script}.py").read_text(encoding="utf-8")
-        for many, few in (("samples = 16", "samples = 4"), ('sections" = 6', 'sections" = 3')):
+        for many, few in SMALLER:
             assert (many in text) == (script == "campaign")
             text = text.replace(many, few)
         (tmp_path / f"{script}.py").write_text(text, encoding="utf-8")
@@ -32,10 +36,7 @@ def test_an_example_runs(scripts: tuple[str, ...], tmp_path: Path) -> None:
 
 
 def runs(script: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(script)],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = preloaded.script(script, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
     for name in re.findall(r"^wrote (\S+)$", done.stdout, re.MULTILINE):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import subprocess
-import sys
 from pathlib import Path
 
+import preloaded
 import pytest
 from click.testing import CliRunner
 from scipy.io import loadmat
@@ -27,15 +27,11 @@ def blocks(language: str) -> list[str]:
 def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "page.py").write_text("\n".join(blocks("python")), encoding="utf-8")
 
-    def call(*words: str) -> list[str]:
-        done = subprocess.run(
-            [sys.executable, *words], cwd=tmp_path, capture_output=True, text=True, timeout=600,
-            check=False,
-        )  # fmt: skip
+    def lines(done: subprocess.CompletedProcess[str]) -> list[str]:
         assert done.returncode == 0, done.stderr
         return done.stdout.splitlines()
 
-    printed = call("page.py")
+    printed = lines(preloaded.script(tmp_path / "page.py", folder=tmp_path))
     assert printed[0] == "all V-joints have reached 180 deg"
     assert float(printed[1]) > 0.0
     assert "8 of 8 samples are ok" in printed
@@ -51,9 +47,10 @@ def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (commands,) = blocks("sh")
     *others, replay = (command.split()[1:] for command in commands.splitlines())
     for words in others:
-        told = CliRunner().invoke(cli, words)
-        assert told.exit_code == 0, told.output
-    assert call("-m", "ringsim", *replay)[-1] == "identical to the stored result"
+        done = CliRunner().invoke(cli, words)
+        assert done.exit_code == 0, done.output
+    told = lines(preloaded.ringsim(*replay, folder=tmp_path))
+    assert told[-1] == "identical to the stored result"
     assert (tmp_path / "tables" / "campaign-sample.csv").exists()
     assert loadmat(tmp_path / "tables" / "campaign.mat")["status"].ravel().tolist() == [0] * 8
     assert (tmp_path / "paraview" / "campaign-sample0.pvd").exists()

@@ -245,7 +245,7 @@ each_section = true
 def test_places_and_names_survive_a_campaign(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("two.toml").write_text(CAMPAIGN, encoding="utf-8")
-    ended = CliRunner().invoke(cli, ["campaign", "two.toml", "--workers=1", "--out=out"])
+    ended = CliRunner().invoke(cli, ["campaign", "two.toml", "--workers=0", "--out=out"])
     assert ended.exit_code == 0, ended.output
     with xr.open_dataset("out/campaign.nc") as found:
         found.load()
@@ -281,7 +281,7 @@ def test_names_are_left_out_where_samples_differ_in_them(tmp_path, monkeypatch) 
     monkeypatch.chdir(tmp_path)
     text = CAMPAIGN + ('[inputs.cables.lower.end]\nkind = "discrete"\nvalues = ["first", "last"]\n')
     Path("two.toml").write_text(text, encoding="utf-8")
-    ended = CliRunner().invoke(cli, ["campaign", "two.toml", "--workers=1", "--out=out"])
+    ended = CliRunner().invoke(cli, ["campaign", "two.toml", "--workers=0", "--out=out"])
     assert ended.exit_code == 0, ended.output
     with xr.open_dataset("out/campaign.nc") as found:
         assert not {"span_name", "pulley_name"} & set(found.variables)

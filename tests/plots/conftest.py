@@ -7,9 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from ring_rods import RODS
 
 from ringsim.dataset import to_dataset
+from ringsim.plots import style
 from ringsim.scene import Scene, scene_from_table
 from ringsim.variables import PLANES, Fate, Outcome, Status
 
@@ -114,3 +116,16 @@ def failed() -> xr.Dataset:
 @pytest.fixture(scope="session")
 def unfinished() -> xr.Dataset:
     return _made_run(_scene_of(2, closed=False), until=12.0)
+
+
+@pytest.fixture
+def settled() -> None:
+    """The layout is found, and words inside axes move to where they cover least, as for users."""
+
+
+@pytest.fixture(autouse=True)
+def _nothing_moves(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A layout costs more than all of the drawing; who looks at places asks for ``settled``."""
+    if "settled" not in request.fixturenames:
+        monkeypatch.setattr(style, "settle", lambda figure: None)
+        monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda engine, figure: None)

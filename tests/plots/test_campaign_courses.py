@@ -42,6 +42,7 @@ def deviation(campaign: xr.Dataset) -> np.ndarray:
     return angle - angle.mean(axis=(1, 2), keepdims=True)
 
 
+@pytest.mark.usefixtures("settled")
 def test_the_fan_shows_the_range_and_the_median_sample(mixed: xr.Dataset) -> None:
     figure, wanted = fan(mixed), deviation(mixed)
     assert median_and_worst(mixed) == (3, 6)

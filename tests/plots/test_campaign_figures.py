@@ -222,6 +222,7 @@ def test_numbers_among_words_stand_by_size(mixed: xr.Dataset) -> None:
     assert [labels[int(place)] for place in places] == stops
 
 
+@pytest.mark.usefixtures("settled")
 @pytest.mark.parametrize("count", [2, 3, 4, 7])
 def test_words_of_inputs_are_whole_and_stand_apart(count: int) -> None:
     campaign = made_campaign(8)
@@ -543,6 +544,7 @@ def test_the_course_of_the_margin_begins_where_runs_begin() -> None:
     assert np.isnan(laid[3, [0, -1]]).all()
 
 
+@pytest.mark.usefixtures("settled")
 @pytest.mark.parametrize("kind", ["random", pytest.param("one-at-a-time", marks=pytest.mark.slow)])
 def test_stress_has_the_numbers_of_its_unit_in_all_figures(kind: str) -> None:
     campaign = made_campaign(12)

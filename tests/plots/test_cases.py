@@ -130,6 +130,7 @@ def test_courses_by_ending_are_those_of_the_cases() -> None:
     assert [each[0] for each in lines_of(course)] == pytest.approx([-0.5, -0.4, -0.3, -0.2, -0.1])
 
 
+@pytest.mark.usefixtures("settled")
 def test_the_legend_of_cases_stays_on_the_sheet() -> None:
     campaign = single_changes(8)
     assert moves(campaign)[0][0] == "base"

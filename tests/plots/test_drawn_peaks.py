@@ -132,6 +132,7 @@ def test_asynchrony_is_drawn_to_the_deployment_and_on_a_linear_axis(deployed):
     assert whole.get_xlim()[0] < begin < float(deployed.deployment_time) < end
 
 
+@pytest.mark.usefixtures("settled")
 def test_a_peak_behind_the_last_record_is_on_the_sheet(failed):
     run = failed.sel(time=slice(0.0, 0.1)).assign(final_time=0.19)
     run = run.assign(peak_rod_stress=9e6, peak_stress_time=0.19, asynchrony_max_time=0.19)

@@ -89,6 +89,7 @@ def test_locks_of_a_run_stand_by_section(campaign: xr.Dataset) -> None:
     assert len(locks(run.drop_vars(["latch_rate", "lock_impulse"])).axes) == 1
 
 
+@pytest.mark.usefixtures("settled")
 def test_marks_that_are_nearly_alike_are_whole(campaign: xr.Dataset) -> None:
     """Impulses of all V-joints within a hundredth, in a run and in a campaign."""
     campaign["lock_impulse"] = 10.6 + 1e-2 * campaign["lock_impulse"] / 20.0

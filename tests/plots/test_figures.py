@@ -235,6 +235,7 @@ def test_limits_of_loads_are_drawn_and_within_the_axes(deployed, scene_of):
     assert not any("limits." in text.get_text() for text in rod_stress(deployed).findobj(Text))
 
 
+@pytest.mark.usefixtures("settled")
 def test_names_of_panels_leave_the_words_of_limits_free(deployed, scene_of):
     """Wherever the limit is: near the top of the axes the corner is taken."""
     for limit in (2e6, 9e6, 1e8):
@@ -249,6 +250,7 @@ def test_names_of_panels_leave_the_words_of_limits_free(deployed, scene_of):
                     assert not box.overlaps(told.get_window_extent())
 
 
+@pytest.mark.usefixtures("settled")
 def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
     figure = Figure()
     axes = figure.subplots()
@@ -264,6 +266,7 @@ def test_stress_on_axes_is_in_megapascal_wherever_its_values_are():
         assert float(tick.get_text()) == pytest.approx(1e-6 * place)
 
 
+@pytest.mark.usefixtures("settled")
 def test_a_vertical_axis_without_a_name_has_the_unit_of_its_panel_s_title():
     figure = Figure()
     stress, force, share = figure.subplots(1, 3)
@@ -304,6 +307,7 @@ def test_energies_are_drawn_in_the_unit_of_the_label(drawn, deployed):
     assert "2.3e-05" in lower.get_title(loc="left")
 
 
+@pytest.mark.usefixtures("settled")
 @pytest.mark.parametrize(
     ("sections", "closed"), [(1, False), pytest.param(6, True, marks=pytest.mark.slow), (72, True)]
 )
@@ -383,6 +387,7 @@ def test_importing_the_figures_changes_no_global_setting():
     assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.usefixtures("settled")
 def test_a_long_ending_stands_clear_of_what_is_above_the_axes(deployed):
     """Words of the lock above the right end of the axes, and the second line of the ending."""
     long = deployed.assign(outcome=int(Fate.OVERLOADED))
@@ -443,6 +448,7 @@ def test_a_figure_is_one_entry(deployed: xr.Dataset, monkeypatch: pytest.MonkeyP
     assert next(figures_of(deployed))[0] is made
 
 
+@pytest.mark.usefixtures("settled")
 @pytest.mark.parametrize("told", [r"$\frac{$", "\x1b[31mred", "x" * 200_000])
 def test_words_of_a_file_are_drawn_whatever_they_are(deployed: xr.Dataset, told: str) -> None:
     """No formula that matplotlib refuses, no letter without a sign, no end of layout."""

@@ -13,6 +13,8 @@ from ringsim.plots.rods_and_cables import rod_stress
 from ringsim.plots.run import Peak, asynchrony, energy, mark, opening_angles
 from ringsim.plots.style import FREE
 
+pytestmark = pytest.mark.usefixtures("settled")
+
 TIMES = np.linspace(0.0, 10.0, 400)
 STEEP = {
     "early": np.exp(-8.0 * TIMES),

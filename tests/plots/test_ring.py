@@ -108,6 +108,7 @@ def test_instants_of_a_failed_run_end_at_its_last_record(failed):
     assert np.isfinite(last).all()
 
 
+@pytest.mark.usefixtures("settled")
 def test_drawing_is_true_to_scale(deployed):
     figure = ring(deployed)
     (axes,) = figure.axes
@@ -136,6 +137,7 @@ def test_views_stand_side_by_side_inside_the_sheet(sections, closed, scene_of, m
     assert max(v[:, 1].max() for v in views) <= axes.get_ylim()[1] + 1e-9
 
 
+@pytest.mark.usefixtures("settled")
 @pytest.mark.parametrize("words", [3, 60])
 @pytest.mark.parametrize("title", ["A ring", "A ring " + 20 * "of many words "])
 def test_words_above_the_ring_stand_apart(title, words, failed):
@@ -240,6 +242,7 @@ def test_more_states_are_equal_steps_of_the_mean_angle(deployed):
         instants(deployed, 1)
 
 
+@pytest.mark.usefixtures("settled")
 def test_shapes_of_modes_stand_below_their_words_with_the_spacecraft():
     craft = {"mass": 800.0, "inertia": [1.0, 1.0, 1.0], "centre": [0.0, 0.0, 1.5]}
     values = {"structure.sections": 3, "spacecraft": craft}

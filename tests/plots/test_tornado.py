@@ -210,6 +210,7 @@ def test_what_has_no_partial_correlation_has_its_plain_one_beside_the_index() ->
     )
 
 
+@pytest.mark.usefixtures("settled")
 def test_rows_are_as_high_as_their_bars_and_tell_once_what_is_alike() -> None:
     """Of three panels two have one bar and one has two: bars are of one height on paper."""
     design = RandomDesign(samples=200)
