@@ -230,7 +230,8 @@ def _way(dataset: xr.Dataset, scene: Scene) -> xr.DataArray:
 
 _LINES = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE)
 _LOCKS = ("lock_time", "latch_rate", "lock_impulse")
-_LEAST: dict[str, Any] = {"color": style.VERMILION, "linewidth": 1.2, "linestyle": (0, (5, 2))}
+LEAST: dict[str, Any] = {"color": style.INK, "linewidth": 1.2, "linestyle": (0, (1.5, 1.5))}
+"""Look of the least rate at which latches catch, which nobody requires: limits are dashed."""
 _BESIDE = 0.12
 """Half the distance of the marks of two planes, which mostly lock alike, in sections."""
 _MARKS = (("o", style.BLUE), ("D", style.ORANGE), ("s", style.GREEN))
@@ -239,7 +240,7 @@ _MARKS = (("o", style.BLUE), ("D", style.ORANGE), ("s", style.GREEN))
 @picture("run", 35, "When and how hard each V-joint locks", ("lock_time",))
 def locks(dataset: xr.Dataset) -> Figure:
     """A panel for ``lock_time`` and, where they are known, ``latch_rate`` and ``lock_impulse``
-    (plane, section); a mark a V-joint.  A dashed line is the least rate at which a latch catches.
+    (plane, section); a mark a V-joint.  A dotted line is the least rate at which a latch catches.
     """
     names = [name for name in _LOCKS if name in dataset and np.isfinite(dataset[name]).any()]
     figure = Figure(figsize=(8.4, 2.1 * len(names) + 1.3))
@@ -262,8 +263,8 @@ def locks(dataset: xr.Dataset) -> Figure:
     least = least_rate(dataset)
     if "latch_rate" in names and least > 0.0:
         axes = panels[names.index("latch_rate")]
-        axes.axhline(least, **_LEAST)
-        entries.append(Line2D([], [], label=f"latches catch from {least:g} rad/s on", **_LEAST))
+        axes.axhline(least, **LEAST)
+        entries.append(Line2D([], [], label=f"latches catch from {least:g} rad/s on", **LEAST))
     figure.align_ylabels(panels)
     panels[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     panels[-1].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)

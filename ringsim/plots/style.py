@@ -5,9 +5,9 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib
 import matplotlib.style
@@ -32,9 +32,15 @@ from ringsim.variables import Fate, Status
 
 FREE = "free-label"
 """Gid of the words that may be moved."""
-_ACROSS = {"left": 0.02, "right": 0.98, "center": 0.5}
+_Side = Literal["left", "right", "center"]
+_ACROSS: dict[_Side, float] = {"left": 0.02, "right": 0.98, "center": 0.5}
 _HEIGHTS = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2)
 """Upper edges that are tried, in shares of the axes, for lines that leave room in one corner."""
+_CENTRES = tuple(k / 40 for k in range(6, 35))
+_TOPS = tuple(k / 20 for k in range(19, 2, -1))
+"""Centres and upper edges that are tried where none of those does, best for words in few lines."""
+_NARROWER = (1.0, 0.7, 0.5)
+"""Lengths of their lines then, over what these are."""
 _AIR = 4.0
 """Around words, in pixels of the sheet: their background is larger than they are."""
 
@@ -57,20 +63,40 @@ def settle(figure: Figure) -> None:
         fixed = (t for t in axes.texts if t.get_gid() != FREE and t.get_visible() and t.get_text())
         taken = [text.get_window_extent().padded(_AIR) for text in fixed]
         for text in texts:
-            own = (text.get_position(), text.get_horizontalalignment())
-            places = [own, *(((_ACROSS[ha], y), ha) for y, ha in product(_HEIGHTS, _ACROSS))]
-            costs = [_cost(axes, text, place, curves, taken) for place in places]
-            _move(text, places[costs.index(min(costs))])
+            words = text.get_text()
+            first = words, text.get_position(), text.get_horizontalalignment()
+            best = _cost(axes, text, first, curves, taken), first
+            corners = ((words, (x, y), ha) for y, (ha, x) in product(_HEIGHTS, _ACROSS.items()))
+            others: Iterator[_Place] = (
+                (_lines(words, share), place, "center")
+                for share in _NARROWER for place in product(_CENTRES, _TOPS)
+            )  # fmt: skip
+            for place in chain(corners, others):
+                if not best[0]:
+                    break
+                found = _cost(axes, text, place, curves, taken), place
+                best = min(best, found, key=lambda each: each[0])
+            _move(text, best[1])
             taken.append(text.get_window_extent())
 
 
-def _move(text: Text, place: tuple[tuple[float, float], str]) -> None:
-    text.set(position=place[0], horizontalalignment=place[1])
+_Place = tuple[str, tuple[float, float], _Side]
+"""Words in lines, where they stand, and which side of them stands there."""
+
+
+def _lines(words: str, share: float) -> str:
+    """Words in lines of such a share of the longest; numbers stay with what is beside them."""
+    width = math.ceil(share * max(map(len, words.split("\n"))))
+    held = re.sub(r"(?<=\d) (?=\D)|(?<=[a-z]) (?=\d)", FIXED, words)
+    return "\n".join(textwrap.fill(each, width) for each in held.split("\n")).replace(FIXED, " ")
+
+
+def _move(text: Text, place: _Place) -> None:
+    text.set(text=place[0], position=place[1], horizontalalignment=place[2])
 
 
 def _cost(
-    axes: Axes, text: Text, place: tuple[tuple[float, float], str], curves: list[Outline],
-    taken: list[Bbox],
+    axes: Axes, text: Text, place: _Place, curves: list[Outline], taken: list[Bbox]
 ) -> int:  # fmt: skip
     """How many curves words would cover there; other words and the frame count more.
 

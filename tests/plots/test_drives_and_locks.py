@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
 import pytest
 import xarray as xr
 from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_motors
+from sheets import cut_words
 
 from ringsim.analysis.courses import courses, ends
 from ringsim.plots.campaign.endings import latch_rate, lock_impulse, margin
@@ -73,6 +75,26 @@ def test_the_least_rate_is_drawn_unless_it_is_drawn_by_sample(campaign: xr.Datas
     assert line(campaign.assign_attrs(scene=other.to_toml())) == []
     assert np.isnan(least_rate(campaign.assign_attrs(scene=made_scene().to_toml())))
     assert np.isnan(least_rate(campaign.drop_attrs(deep=False)))
+
+
+def test_bounds_of_requirements_are_drawn_beside_the_rates_and_impulses(
+    campaign: xr.Dataset,
+) -> None:
+    about = {"probability": 0.9, "confidence": 0.9}
+    wanted = {
+        "least_latch_rate": about | {"min": 0.3}, "peak_latch_rate": about | {"max": 0.75},
+        "peak_lock_impulse": about | {"max": 2.0}, "peak_tension": about | {"max": 9.0},
+    }  # fmt: skip
+    campaign.attrs["requirements"] = json.dumps(wanted)
+    for draw, known in (
+        (latch_rate, {"min 0.3 rad/s": 0.3, "max 0.75 rad/s": 0.75}),
+        (lock_impulse, {"max 2 N m s": 2.0}),
+    ):
+        for axes in draw(campaign).axes:
+            assert {text.get_text(): text.xy[1] for text in axes.texts} == known
+            heights = [line.get_ydata()[0] for line in axes.lines if len(line.get_ydata()) == 2]
+            assert set(known.values()) <= set(heights)
+        assert not cut_words(draw(campaign))
 
 
 def test_locks_of_a_run_stand_by_section(campaign: xr.Dataset) -> None:

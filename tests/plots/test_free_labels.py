@@ -62,6 +62,29 @@ def test_name_and_largest_value_avoid_a_steep_curve(heights: np.ndarray) -> None
     assert not one.overlaps(other)
 
 
+def test_words_stand_between_curves_below_a_limit_in_as_many_lines_as_fit() -> None:
+    """Many curves at the start, spikes later on, a limit with its name above: as cables have."""
+    figure = Figure(figsize=(5.0, 2.2))
+    axes = figure.subplots()
+    axes.set_xlim(0.0, 10.0)
+    for size in np.linspace(10.0, 60.0, 12):
+        late = np.where(np.abs(TIMES - 6.8) < 0.1, size, 0.0)
+        axes.plot(TIMES, np.where(TIMES < 2.0, size, late))
+    axes.set_ylim(0.0, 95.0)
+    style.draw_limit(axes, 75.0, "limits.tension = 75 N")
+    mark(axes, Peak(60.0, 1.0, {}), "N", "span 1, winch to section 1 first hinge")
+    style.head(figure, axes, xr.Dataset({"status": 0}), "Cables")
+    assert covered(figure) == []
+    (words,) = (text for text in axes.texts if text.get_gid() == FREE)
+    figure.draw_without_rendering()
+    box = words.get_window_extent()
+    limit = axes.transData.transform((0.0, 75.0))[1]
+    assert not box.y0 < limit < box.y1
+    told = words.get_text()
+    assert " ".join(told.split()) == ("largest: 60 N at 1 s span 1, winch to section 1 first hinge")
+    assert any(line.endswith("60 N at 1 s") or "section 1" in line for line in told.split("\n"))
+
+
 def test_names_stay_in_their_corner_where_nothing_is_in_the_way() -> None:
     figure = Figure(figsize=(5.0, 3.0))
     axes = figure.subplots()

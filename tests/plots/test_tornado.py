@@ -11,14 +11,16 @@ from made_campaign import made_campaign
 from matplotlib.figure import Figure
 
 from ringsim.analysis.design import placement
+from ringsim.analysis.influence_text import what_matters
 from ringsim.analysis.sensitivity import sensitivity
+from ringsim.analysis.study import analyse
 from ringsim.plots.campaign.frame import ALL_ALIKE, in_lines
 from ringsim.plots.campaign.numbers import distributions
 from ringsim.plots.campaign.tornado import bars_of, explained, tornado
 from ringsim.sampling.designs.blocks import Morris, Saltelli
 from ringsim.sampling.designs.independent import RandomDesign
 from ringsim.sampling.distributions import Uniform
-from ringsim.variables import Status
+from ringsim.variables import Fate, Status
 
 FACTORS = dict.fromkeys(("force", "modulus"), Uniform(low=0.0, high=1.0))
 
@@ -96,6 +98,38 @@ def test_what_chance_would_explain_has_no_bar() -> None:
     told = " ".join(each.get_title().get_text() for each in tornado(campaign).legends)
     told += tornado(campaign).get_supxlabel()
     assert "No significant input for peak_tension" in " ".join(told.split())
+
+
+def test_bars_stand_in_the_order_of_the_table() -> None:
+    """Behind the input with an index those with a correlation, the stronger first."""
+    campaign = made(RandomDesign(samples=60)).assign_attrs(requirements="{}")
+    stream = np.random.default_rng(11)
+    weak = {name: stream.random(60) for name in ("damping", "friction", "delay")}
+    for name, values in weak.items():
+        campaign[name] = "sample", values, {"role": "input", "path": name}
+    force = campaign["force"].values
+    mixed = 0.12 * weak["damping"] + 0.2 * weak["friction"] + 0.09 * weak["delay"]
+    campaign["peak_tension"][:] = 20.0 + 3.0 * force + mixed
+    (bars,) = (each for name, each in bars_of(campaign) if name == "peak_tension")
+    rows = what_matters(analyse(campaign)).rows
+    assert bars.names[:3] == [row[1] for row in rows[:3]] == ["force", "friction", "damping"]
+    assert bars.inside.tolist() == sorted(bars.inside.tolist(), reverse=True)
+    sizes = np.abs(bars.values).tolist()
+    assert sizes != sorted(sizes, reverse=True)  # the order of indices would be another one
+
+
+def test_what_all_samples_have_in_common_needs_no_word() -> None:
+    campaign = made_campaign(30)
+    about = {"probability": 0.9, "confidence": 0.9}
+    campaign["outcome"][:] = int(Fate.DEPLOYED)
+    campaign["deployment_time"] = 30.0 + 1e-5 * campaign["rods_young_modulus"] / 1e11
+    wanted = {"outcome": about | {"is": "deployed"}, "deployment_time": about | {"max": 40.0}}
+    campaign["deployment_time_error"] = "sample", np.full(30, 0.5), {"units": "s"}
+    campaign.attrs["requirements"] = json.dumps(wanted)
+    (legend,) = tornado(campaign).legends
+    told = " ".join(legend.get_title().get_text().split())
+    assert f"Not told, because {ALL_ALIKE}: deployment_time." in told
+    assert "outcome" not in told
 
 
 def test_a_shut_gate_is_told_with_what_is_known_beside_it() -> None:

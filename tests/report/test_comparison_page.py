@@ -221,7 +221,10 @@ def test_words_of_figures_fit_their_sheets(both: tuple[xr.Dataset, xr.Dataset]) 
     for shift, each in enumerate((one, other)):
         for name in ("longest_slack", "peak_motor_torque", "longest_motor_lag"):
             each[name] = "sample", np.arange(8.0) + shift, told  # one ends a row of panels
-    names = ("ground12", "flight12"), ("the same ring on the ground with hot motors", "b" * 60)
+    names = (
+        ("ground-8m-hot-2", "flight-8m-cold1"),
+        ("the same ring on the ground with hot motors", "b" * 60),
+    )
     for first, second in names:
         found = compare(one, other, (first, second))
         for name, _, figure in figures_of_both(found, one, other):

@@ -19,7 +19,7 @@ from ringsim.analysis.design import (
     values_of,
 )
 from ringsim.analysis.intervals import good, used
-from ringsim.outputs.family import Array
+from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
     bands,
@@ -34,8 +34,9 @@ from ringsim.plots.campaign.frame import (
     of_cases,
     shown_until,
 )
-from ringsim.plots.drives_and_locks import drive_end, least_rate, standard_of
+from ringsim.plots.drives_and_locks import LEAST, drive_end, least_rate, standard_of
 from ringsim.tables import counted as number_of
+from ringsim.tables import with_unit
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
 
@@ -283,7 +284,9 @@ def motors(campaign: xr.Dataset) -> Figure:
 
 @picture("campaign", 72, "Opening rate of each V-joint at its latch", ("latch_rate",))
 def latch_rate(campaign: xr.Dataset) -> Figure:
-    """Bands of ``latch_rate`` (sample, plane, section); the least rate at which latches catch."""
+    """Bands of ``latch_rate`` (sample, plane, section); the least rate at which latches catch, and
+    what is required of the least and the largest rate.
+    """
     paths = by_path(campaign)
     drawn = any(path.startswith(("latch.min_rate", "latch[")) or path == "latch" for path in paths)
     least = np.nan if drawn else least_rate(campaign)
@@ -292,7 +295,7 @@ def latch_rate(campaign: xr.Dataset) -> Figure:
 
 @picture("campaign", 74, "Impulse of each stop at the lock of its V-joint", ("lock_impulse",))
 def lock_impulse(campaign: xr.Dataset) -> Figure:
-    """Bands of ``lock_impulse`` (sample, plane, section)."""
+    """Bands of ``lock_impulse`` (sample, plane, section); what is required of the largest."""
     return _by_joint(campaign, "lock_impulse", "Latch shock")
 
 
@@ -301,6 +304,11 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
     samples themselves where they are cases.
     """
     held = used(campaign)[name].transpose("sample", "plane", "section")
+    units = str(held.attrs.get("units", "1"))
+    required = [
+        bound for each in VARIABLES.values() if name in (each.largest_of, each.least_of)
+        for bound in limits(campaign, each.name)
+    ]  # fmt: skip
     planes, sections = held["plane"].values.tolist(), held["section"].values
     cases = looks_of_cases(campaign, held["sample"].values)
     figure = Figure(figsize=(8.4, 2.1 * len(planes) + 1.4))
@@ -316,9 +324,14 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
             axes.vlines(at, low, high, color=style.BLUE, linewidth=1.0, label="0-100 %")
             axes.vlines(at, lower, upper, color=style.SKY, linewidth=5.0, label="5-95 %")
             axes.plot(at, middle, "o", color=style.INK, markersize=4, label="median")
+        for word, limit in required:
+            axes.axhline(limit, color=style.VERMILION, linewidth=1.3, linestyle=(0, (5, 2)))
+            # Beside the frame, where nothing is drawn.
+            axes.annotate(f"{word} {with_unit(f'{limit:g}', units)}", (1.0, limit), va="center",
+                          color=style.VERMILION, xycoords=axes.get_yaxis_transform(), fontsize=9,
+                          textcoords="offset points", xytext=(4, 0))  # fmt: skip
         if least > 0.0:
-            axes.axhline(least, color=style.VERMILION, linewidth=1.2, linestyle=(0, (5, 2)),
-                         label=f"latches catch from {least:.3g} rad/s on")  # fmt: skip
+            axes.axhline(least, label=f"latches catch from {least:.3g} rad/s on", **LEAST)
         axes.set_title(f"{plane} plane", fontsize=9.5)
         axes.grid(visible=False, axis="x")
     style.from_zero(grid[0])

@@ -26,8 +26,8 @@ from ringsim.analysis.design import (
 from ringsim.analysis.indices import UNLIKELY, largest_by_chance
 from ringsim.analysis.influence import LEAST, influence
 from ringsim.analysis.influence_text import mattering
-from ringsim.analysis.intervals import quantities, ran, varies
-from ringsim.analysis.requirements import required_by
+from ringsim.analysis.intervals import good, quantities, ran, varies
+from ringsim.analysis.requirements import OUTCOME, required_by
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import one_at_a_time
@@ -70,7 +70,7 @@ _NONE = 3 * (np.empty(0), np.empty((0, 2)))
 
 
 class Bars(NamedTuple):
-    """Bars of one output, the longest first, at most 8; intervals NaN where there are none.
+    """Bars of one output in the order of tables, at most 8; intervals NaN where there are none.
 
     What chance would explain has no bar, nor what shares places with a longer bar.
     """
@@ -176,12 +176,12 @@ def _bars(
     known = _values(analysis, measure, output)
     assert known is not None
     values, (dim,) = known.values, known.dims
-    order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
-    order = order[np.isfinite(values[order])]
     names = analysis[dim].values.astype(str)
+    order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
     if chance is not None:
-        order = order[np.isin(names[order], matter)]
-    order = order[:_MOST]
+        at = {name: k for k, name in enumerate(names.tolist())}
+        order = np.array([at[name] for name in matter if name in at], dtype=np.int64)
+    order = order[np.isfinite(values[order])][:_MOST]
 
     def of(variable: str, shape: tuple[int, ...]) -> NDArray[np.floating]:
         found = _values(analysis, variable, output)
@@ -263,13 +263,16 @@ def tornado(campaign: xr.Dataset) -> Figure:
         whiskers += " Bars without whiskers: interval not known."
     most = max((len(values_of(campaign, name)[0]) for name in drawable(campaign)), default=0)
     beyond = any(np.isfinite(bars.chance) for _, bars in found)
-    of = f"The longest {_MOST} bars at most{', significant inputs only' * beyond}."
+    of = f"The longest {_MOST} bars at most."
+    if beyond:
+        of = f"Significant inputs only, {_MOST} at most, in the order of the table."
     if any((np.abs(bars.values) < bars.chance).any() for _, bars in found):
         of += " An index that ends before the dashed line is drawn for the correlation below it."
     each = f"{shared[0].upper()}{shared[1:]} in each panel." if shared else ""
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", each, whiskers, of]))
     stand = population_of(campaign)
-    if untold := [name for name in wanted if name in stand and not varies(stand, name)]:
+    untold = [n for n in wanted if n in stand and not (varies(stand, n) or _alike(stand, n))]
+    if untold:
         caption += f" Not told, because {ALL_ALIKE}: {', '.join(untold)}."
     if quiet:
         caption += f" No significant input for {', '.join(quiet)}."
@@ -277,6 +280,12 @@ def tornado(campaign: xr.Dataset) -> Figure:
         caption += f" Not drawn for want of room: {', '.join(others)}."
     head(figure, campaign, "What matters", caption + unmoved)
     return figure
+
+
+def _alike(campaign: xr.Dataset, name: str) -> bool:
+    """Whether all samples have the same: then no input can matter, which needs no word."""
+    every = endings(campaign)[good(campaign)] if name == OUTCOME else values_of(campaign, name)[1]
+    return len(np.unique(every)) < 2
 
 
 _LABEL = 48
