@@ -31,7 +31,7 @@ class Figures(dict[str, "Figure"]):
         return f'figures: {", ".join(self)}: figures["NAME"].savefig("NAME.png")'
 
     def _repr_html_(self) -> str:
-        from ringsim.plots.inline import Inline
+        from ringsim.plots.figures import Inline
 
         drawn = (
             f"<p>{name}</p>{Inline(figure, name, name).element()}" for name, figure in self.items()
@@ -101,7 +101,7 @@ class Ring:
 
         InputError if there is no such figure, or its numbers are not recorded.
         """
-        from ringsim.plots import figures, inline
+        from ringsim.plots import figures
         from ringsim.refusal import InputError, known_or_nearest
 
         if name is not None and name not in (known := figures.names_for(self._dataset)):
@@ -110,7 +110,7 @@ class Ring:
         drawn = Figures()
         for each, figure in figures.figures_of(self._dataset, name):
             # A notebook shows it so also where pyplot has not told it how.
-            vars(figure)["_repr_png_"] = functools.partial(inline.as_png, figure)
+            vars(figure)["_repr_png_"] = functools.partial(figures.as_png, figure)
             drawn[each.name] = figure
         return drawn if name is None else drawn[name]
 

@@ -24,8 +24,8 @@ from ringsim.files import DESIGN, MERGED, campaign_cure
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import BLOCK_ROW
+from ringsim.sampling.designs import Design
 from ringsim.sampling.designs.blocks import Grouped, stretches
-from ringsim.sampling.designs.family import Design
 from ringsim.stepping.instant import Array
 from ringsim.variables import GOALS, NO_CODE, Cause, Code, Fate, Status
 

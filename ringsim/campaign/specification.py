@@ -25,7 +25,7 @@ from ringsim.outputs.family import VARIABLES, axes, holds, supply
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Correlation, Table
-from ringsim.sampling.designs.family import Design
+from ringsim.sampling.designs import Design
 from ringsim.sampling.distributions import Distribution, plain
 from ringsim.sampling.table import (
     AnyDesign,

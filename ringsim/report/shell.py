@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from ringsim.files import whole, writing
-from ringsim.plots.inline import HEAVY, Inline
+from ringsim.plots.figures import HEAVY, Inline
 from ringsim.refusal import InputError
 from ringsim.tables import Table
 

@@ -16,8 +16,8 @@ from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.overrides import field_at, place_of, pulleys_at, section_of, with_number
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.sampling.columns import BLOCK_ROW, Column, Correlation, Table
+from ringsim.sampling.designs import Design
 from ringsim.sampling.designs.blocks import Grouped
-from ringsim.sampling.designs.family import Design
 from ringsim.sampling.distributions import Distribution, Values, extremes_of, is_label, plain
 from ringsim.scene import Scene
 from ringsim.tables import unit_text

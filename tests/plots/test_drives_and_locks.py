@@ -77,6 +77,7 @@ def test_the_least_rate_is_drawn_unless_it_is_drawn_by_sample(campaign: xr.Datas
     assert np.isnan(least_rate(campaign.drop_attrs(deep=False)))
 
 
+@pytest.mark.usefixtures("settled")
 def test_bounds_of_requirements_are_drawn_beside_the_rates_and_impulses(
     campaign: xr.Dataset,
 ) -> None:

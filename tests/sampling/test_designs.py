@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 from ringsim.choice import kinds_of
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Correlation
-from ringsim.sampling.designs.family import Design
+from ringsim.sampling.designs import Design
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import load_scene
 

@@ -13,7 +13,7 @@ from pydantic import Field
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.columns import Correlation, pairs_of
-from ringsim.sampling.designs.family import Design, Factors, Samples
+from ringsim.sampling.designs import Design, Factors, Samples
 from ringsim.sampling.designs.independent import Replicated, sobol_points
 from ringsim.sampling.distributions import Array, Values
 from ringsim.units import ListIn

@@ -14,7 +14,7 @@ from ringsim.files import read_text
 from ringsim.overrides import parse_value
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.columns import Correlation, read_inputs
-from ringsim.sampling.designs.family import Design, Factors, Samples
+from ringsim.sampling.designs import Design, Factors, Samples
 from ringsim.sampling.distributions import Array, Values, array_of, inside, is_label
 
 Levels = Annotated[int, Field(ge=1, le=100_000)]

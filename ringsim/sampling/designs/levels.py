@@ -22,7 +22,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
 from ringsim.refusal import known_or_nearest
-from ringsim.sampling.designs.family import Design, Factors
+from ringsim.sampling.designs import Design, Factors
 from ringsim.sampling.distributions import Array, inside
 from ringsim.variables import OF_CAMPAIGNS
 
