@@ -36,7 +36,7 @@ _Side = Literal["left", "right", "center"]
 _ACROSS: dict[_Side, float] = {"left": 0.02, "right": 0.98, "center": 0.5}
 _HEIGHTS = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2)
 """Upper edges that are tried, in shares of the axes, for lines that leave room in one corner."""
-_CENTRES = tuple(k / 40 for k in range(6, 35))
+_CENTRES = tuple(k / 20 for k in range(3, 18))
 _TOPS = tuple(k / 20 for k in range(19, 2, -1))
 """Centres and upper edges that are tried where none of those does, best for words in few lines."""
 _NARROWER = (1.0, 0.7, 0.5)

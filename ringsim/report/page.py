@@ -40,7 +40,7 @@ from ringsim.plots.comparison import figures_of_both, measured_and_computed
 from ringsim.plots.figures import figures_of
 from ringsim.refusal import show
 from ringsim.report.player import player
-from ringsim.report.shell import written
+from ringsim.report.shell import filling, written
 from ringsim.sampling.distributions import law_text
 from ringsim.scene import builtin_scenes
 from ringsim.tables import number_text, unit_text
@@ -233,8 +233,8 @@ def _comments(text: str) -> dict[str, str]:
 
 _ANSWERS = ("one_by_one", "rare_event", "distributions", "margin", "fan", "latch_rate")
 """Figures that answer what campaigns are run for, in the order in which they are told; the first
-``_FIRST`` of them stand on the first page, all others are evidence, but ``_MATTERS``, which stands
-where it is told what matters, unless nothing does."""
+``_FIRST`` of them stand on the first page, with others for which its last sheet has room; all else
+is evidence, but ``_MATTERS``, which stands where it is told what matters, unless nothing does."""
 _MATTERS = "tornado"
 _FIRST = 3
 
@@ -296,7 +296,7 @@ def page(
                   if name in campaign},
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign),
-        "first": _FIRST, "player": shown, "failures": fell_short, "more": more,
+        "player": shown, "failures": fell_short, "more": more,
         "short": bool(short.any()),
         "worst_note": note_on_unusual(analysis),
         "players": {str(sample): k for sample, k in places.items()},
@@ -315,7 +315,10 @@ def page(
             "less the median, in standard deviations of a reading",
             measured_and_computed(apart, title),
         ))  # fmt: skip
-    return written("page.html.j2", context, figures, beside=(_MATTERS, "measured"))
+    own = (_MATTERS, "measured")
+    others, first = filling([e for e in figures if e[0] not in own], _FIRST, _ANSWERS)
+    figures = others + [each for each in figures if each[0] in own]
+    return written("page.html.j2", context | {"first": first}, figures, beside=own)
 
 
 def _turn(name: str) -> int:

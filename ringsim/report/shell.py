@@ -25,6 +25,10 @@ LARGEST = 2_000_000
 """Bytes of a page: it is to go by mail."""
 
 
+Drawn = list[tuple[str, str, "Figure"]]
+"""Name, what it shows in words, and figure."""
+
+
 def written(
     template: str, context: Mapping[str, Any], drawn: Sequence[tuple[str, str, "Figure"]],
     beside: Collection[str] = (),
@@ -42,6 +46,44 @@ def written(
         if len(text.encode("utf-8")) <= LARGEST:
             break
     return text
+
+
+_SHEET, _SCALE, _CAPTION = (7.17, 10.6), 0.58, 0.4
+"""Width and height of a printed sheet within its margins, size of figures on it over that as they
+are drawn, both as page.css has them, and height of a caption with the gap below it; inch."""
+
+
+def filling(drawn: Drawn, first: int = 0, more: Collection[str] = ()) -> tuple[Drawn, int]:
+    """Figures in an order that leaves little of the sheets of a printed page empty.
+
+    The ``first`` of them stay where they are, with those named in ``more`` for which their last
+    sheet has room; each other one moves up to the first sheet that has some.  Returns them, and how
+    many stay.
+    """
+    kept, rest, room = list(drawn[:first]), list(drawn[first:]), 0.0
+    for each in kept:
+        size = _printed(each)
+        room = (room if room >= size else _SHEET[1]) - size
+    for each in [each for each in rest if each[0] in more and kept]:
+        if (size := _printed(each)) <= room:
+            room -= size
+            kept.append(each)
+            rest.remove(each)
+    sheets = list[tuple[float, Drawn]]()
+    for each in rest:
+        size = _printed(each)
+        fits = (k for k, (free, _) in enumerate(sheets) if free >= size)
+        if (k := next(fits, None)) is None:
+            sheets.append((_SHEET[1] - size, [each]))
+        else:
+            sheets[k] = sheets[k][0] - size, [*sheets[k][1], each]
+    return [*kept, *(each for _, own in sheets for each in own)], len(kept)
+
+
+def _printed(drawn: tuple[str, str, "Figure"]) -> float:
+    """Height of a figure with its caption on paper, inch."""
+    wide, high = map(float, drawn[2].get_size_inches())
+    return min(_SCALE, _SHEET[0] / wide) * high + _CAPTION
 
 
 @functools.cache

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_positions
+from matplotlib.figure import Figure
 
 from read_page import Page
 from ringsim.analysis.influence_text import sensitivity_tables, what_matters
@@ -35,7 +36,7 @@ from ringsim.report import page as model
 from ringsim.report import shell
 from ringsim.report.page import page
 from ringsim.report.player import player
-from ringsim.report.shell import LARGEST
+from ringsim.report.shell import LARGEST, filling
 from ringsim.scene import load_scene
 from ringsim.shapes import COMPUTED, FROM_ANGLES
 from ringsim.tables import interval_text, number_text, slim
@@ -564,6 +565,23 @@ def test_what_can_be_broken_stands_behind_what_cannot() -> None:
     assert any("short" in kind for kind, _ in rows.values())
     for name, (kind, count) in rows.items():
         assert ("short" in kind) == (count <= 16 and name != "model-table"), name
+
+
+@pytest.mark.quick
+def test_figures_stand_where_they_fill_the_sheets_of_a_printed_page() -> None:
+    def drawn(**heights: float) -> list[tuple[str, str, Figure]]:
+        return [(name, "", Figure(figsize=(8.0, high))) for name, high in heights.items()]
+
+    def names(figures: list[tuple[str, str, Figure]]) -> str:
+        return "".join(name for name, *_ in figures)
+
+    # On paper 5.2, 3.3 and 6.2 inch of 10.6: d fills what c leaves, f what e does.
+    every = drawn(a=8.3, b=5.0, c=8.3, d=5.0, e=10.0, g=10.0, f=5.0)
+    found, first = filling(every, 3, ("d", "f"))
+    assert (names(found), first) == ("abcdefg", 4)
+    assert filling(every, 3)[1] == 3
+    assert names(filling(every)[0]) == "abcdefg"
+    assert filling([], 3, ("d",)) == ([], 0)
 
 
 @pytest.mark.usefixtures("_undrawn")
