@@ -15,7 +15,7 @@ POISON = {
     3: (1, Status.ERROR, "ZeroDivisionError: on purpose"),
     7: (2, Status.CRASHED, "SIGSEGV"),
     8: (3, Status.CRASHED, "exit code 7"),
-    20: (4, Status.TIMEOUT, "limits.timeout = 2 s"),
+    20: (4, Status.TIMEOUT, "limits.timeout = 4 s"),
     21: (5, Status.MEMORY, "memory"),
     30: (6, Status.DIVERGED, "asynchrony is not a number"),
     31: (7, Status.ERROR, "TypeError"),
@@ -23,7 +23,7 @@ POISON = {
     49: (9, Status.SOLVER_FAILED, "smaller step"),
 }
 SAMPLES = 50
-LIMITS = "[limits]\ntimeout = 2.0\nmemory = 6e8\n"
+LIMITS = "[limits]\ntimeout = 4.0\nmemory = 6e8\n"
 
 
 def ways():
