@@ -141,7 +141,8 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
             continue
         together = found[f"{name}_rank_correlation"].item()
         sizes = np.abs(found[f"{name}_mean"].values)
-        if (found[f"{name}_spread"].values < _STILL * sizes).any():
+        spread, errors = found[f"{name}_spread"].values, found[f"{name}_numerical_error"].values
+        if (spread < np.fmax(_STILL * sizes, errors)).any():
             still += [name] * (together < _LOW)
             continue
         pairs = int(found[f"{name}_samples"].values[0])
@@ -160,7 +161,8 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
     if still:
         yield (
             f"the ranks of pairs say little of {', '.join(still)}: in one of the two, or in both, "
-            f"the samples scatter by less than {100 * _STILL:g} % of their mean"
+            f"the samples scatter by less than {100 * _STILL:g} % of their mean, or than the "
+            "numerical error"
         )
 
 
@@ -206,7 +208,7 @@ def sections(found: xr.Dataset) -> dict[str, Section]:
             _moved(found),
         ]),
         Section("limits", "Margins to limits", [_questioned(_limits(found), found)]),
-        Section("outputs", "Numbers", [_questioned(_outputs(found), found)]),
+        Section("outputs", "Numbers", [_questioned(_outputs(found)[0], found)]),
     )  # fmt: skip
     return {
         each.name: each._replace(tables=tables)
@@ -312,9 +314,11 @@ def _changed(found: xr.Dataset) -> Table:
     return Table(("sample", *(f"in {name}" for name in names_of(found))), rows, notes, left=3)
 
 
-def _outputs(found: xr.Dataset) -> Table:
-    """Means of both, their difference with its interval, and the pair that differs most."""
-    rows, alike = [], list[str]()
+def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
+    """Means of both, their difference with its interval, and the pair that differs most; and the
+    outputs of which a note says that all samples of both are nearly the same.
+    """
+    rows, alike, flat = [], list[str](), dict[str, str]()
     for name, variable in quantities().items():
         if f"{name}_difference" not in found or is_moment(name):
             continue
@@ -341,6 +345,11 @@ def _outputs(found: xr.Dataset) -> Table:
                 told = f" {value} {unit_text(unit)}".rstrip() * bool(found.attrs["runs"])
                 alike.append(f"{name}{told}")
                 continue
+            size = max(abs(first), abs(second))
+            scatter = factor * float(found[f"{name}_spread"].values.max())
+            if max(abs(second - first), abs(most), scatter) < _ALIKE * size:
+                flat[name] = f"{name} {number_text(first)} {unit_text(unit)}".rstrip()
+                continue
             largest = number_text(most)
             place = str(found[f"{name}_largest_difference_sample"].item())
             rank = found[f"{name}_rank_correlation"].item()
@@ -363,10 +372,12 @@ def _outputs(found: xr.Dataset) -> Table:
     columns = 8 if found.attrs["runs"] else len(head)
     same = "the same in both" if found.attrs["runs"] else "the same in each pair"
     notes = [f"{same}: {', '.join(alike)}"] * bool(alike) + _numerical(found, [r[0] for r in rows])
+    notes += [f"all samples within {100 * _ALIKE:g} %: {', '.join(flat.values())}"] * bool(flat)
     for name, side in zip(names_of(found), ("first", "second"), strict=True):
         only = found.attrs[f"only_{side}"]
         notes += [f"in {name} alone: {only}"] * bool(only)
-    return marked(Table(head[:columns], [row[:columns] for row in rows], notes), found)
+    table = Table(head[:columns], [row[:columns] for row in rows], notes)
+    return marked(table, found), [*flat]
 
 
 def _percent(first: float, second: float) -> str:
@@ -396,6 +407,7 @@ def _worse(found: xr.Dataset, name: str) -> str:
 
 def differing(found: xr.Dataset) -> Iterator[str]:
     """The outputs that are not the same in both, those first that an engineer fears to be worse."""
-    table = _outputs(found)
-    names = [row[0] for row in table.rows if np.isfinite(found[f"{row[0]}_difference"])]
+    table, flat = _outputs(found)
+    every = [*(row[0] for row in table.rows), *flat]
+    names = [name for name in every if np.isfinite(found[f"{name}_difference"])]
     yield from sorted(names, key=lambda name: not quantities()[name].badness)

@@ -586,8 +586,8 @@ def rarer_table(analysis: xr.Dataset) -> Table:
         )
     notes += [f"further significant changes: {', '.join(more)}"] * bool(more)
     if quiet and which:
-        what = "if one input scattered otherwise, no significant change of the probability of"
-        notes.append(f"{what} violating {', '.join(quiet)} (by weights of these samples)")
+        what = f"if an input scattered {100 * STEP:g} % less, no significant change of the chance"
+        notes.append(f"{what} of violating {', '.join(quiet)} (by weights of these samples)")
     why = "changes that these samples cannot tell, since few would have most of the weight"
     notes += [f"{why}: {', '.join(unequal)}"] * bool(unequal)
     needs = f"{LEAST_OF_SHARE:g} that violate and as many that do not are needed"

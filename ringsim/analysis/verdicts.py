@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from collections.abc import Iterator, Mapping
 from itertools import takewhile
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim.analysis.campaign_notes import LATE, doubtful, marked, uncertain_latches
-from ringsim.analysis.design import Placement
+from ringsim.analysis.design import Placement, by_path
 from ringsim.analysis.intervals import (
     Interval,
     Mask,
@@ -36,6 +37,7 @@ from ringsim.analysis.requirements import (
 )
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
+from ringsim.overrides import flat
 from ringsim.refusal import known_or_nearest
 from ringsim.tables import Table, bound_text, counted, number_text, with_unit
 from ringsim.units import Model
@@ -231,7 +233,7 @@ def judge(
         require_values(campaign, name)
         off = doubted.get(name, none)
         if name == LATCHED or (name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word):
-            latches = uncertain_latches(campaign)
+            latches = uncertain_latches(campaign) + _slow(campaign)
             if name == LATCHED:  # so many more or fewer may have caught
                 latches = latches - np.abs(wanted.beyond(numbers(campaign, name)))
             off = off | (latches > 0.0)
@@ -359,6 +361,18 @@ def _close(campaign: xr.Dataset, name: str, wanted: Requirement) -> tuple[Mask, 
     return np.asarray(apart < np.where(known, bars, error)), error
 
 
+def _slow(campaign: xr.Dataset) -> Mask:
+    """Which samples met a latch at a rate that is closer to the least at which it catches than the
+    rate's numerical error.
+    """
+    scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
+    least = scene.get("latch.min_rate", 0.0)
+    if not isinstance(least, float) or not least or "latch.min_rate" in by_path(campaign):
+        return np.zeros(campaign.sizes["sample"], dtype=bool)
+    wanted = Requirement(min=least, probability=0.5, confidence=0.5)
+    return _close(campaign, "least_latch_rate", wanted)[0]
+
+
 IF_HOLD = "if its numbers hold"
 """Behind a verdict that numbers which may be off could change."""
 LATCHED = "latched_joints"
@@ -415,13 +429,14 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         error = with_unit(number_text(one["numerical_error"], 2), quantities()[name].units)
         told.append(
             f"{name}: in {counted(close, 'sample')} it is closer to the limit than its numerical "
-            f"error, {error} (root mean square of error bars): smaller steps, or more elements, "
-            "settle it"
+            f"error (the sample's own error bar, or without one {error}, the root mean square of "
+            "those that have one): smaller steps, or more elements, settle it"
         )
     if others and name in (OUTCOME, LATCHED):
         told.append(
             f"{name}: in {counted(others, 'sample')} it is uncertain whether all latches catch, as "
-            "another joint locks in the same step: smaller steps settle it"
+            "another joint locks in the same step, or the rate's numerical error decides it: "
+            "smaller steps settle it"
         )
     return told
 

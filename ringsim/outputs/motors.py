@@ -295,7 +295,8 @@ class DriveMargins(Output):
     def told(self, values: Values, span_names: SpanNames) -> str:
         """As "at 20.5 deg and 0.1 s: NOT enough"; of a plane whose own cable falls short by more
         than the mean of both, "at 20.5 deg and 0.1 s: enough, but one plane has -1.000", or "NOT
-        enough, and one plane even -0.951".
+        enough, and one plane even -0.951"; where that is before the last winch starts, "(-0.110
+        from the start of the last winch on)".
         """
         names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
@@ -305,7 +306,9 @@ class DriveMargins(Output):
         plane = float(values.get("least_plane_margin", math.nan))
         also = ", but one plane has" if margin >= 0.0 else ", and one plane even"
         own = f"{also} {plane:.3f}" if plane < min(margin, 0.0) - 5e-4 else ""
-        return f"at {angle:.4g} deg and {time:.4g} s: {word}{own}"
+        started = float(values.get("least_drive_margin_started", math.nan))
+        then = f" ({started:.3f} from the start of the last winch on)" * (started > margin + 5e-4)
+        return f"at {angle:.4g} deg and {time:.4g} s: {word}{own}{then}"
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Nothing: ``ringsim.rigid.margin`` knows them."""

@@ -178,7 +178,7 @@ def test_a_verdict_says_so_if_numerical_errors_could_change_it() -> None:
             assert bool(note) == (not stands and verdict != 1)
             if note:
                 assert f"in {close} sample" in note
-                assert f"error, {np.hypot(*bars) / np.sqrt(2.0):.2g} N (" in note
+                assert f"without one {np.hypot(*bars) / np.sqrt(2.0):.2g} N, the" in note
                 assert not_met(found) == [f"{table.rows[0][0]}: {table.rows[0][1]}"]
             seen.add((verdict, stands))
     assert {(2, True), (2, False), (0, True)} <= seen
@@ -197,6 +197,17 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
         told = f"met, if its numbers hold: may be off in {count} of 30 samples"
         assert table.rows[0][1] == ("met" if stands else told)
         assert any("uncertain whether all latches catch" in n for n in table.notes) != stands
+    # A rate of 0.30 rad/s, known to 0.06, may have been below the 0.25 at which latches catch.
+    made["reason"] = "sample", np.array([REACHED] * 30)
+    made["least_latch_rate"] = "sample", np.array([*[0.30] * 4, *[0.40] * 26])
+    made["least_latch_rate_error"] = "sample", np.array([0.06, *[np.nan] * 29])
+    wanted = {"outcome": {"is": "deployed", "probability": 0.8, "confidence": 0.9}}
+    assert verdict_table(analyse(made, wanted)).rows[0][1] == "met"
+    made.attrs["scene"] += "\n[latch]\nmin_rate = 0.25\n"
+    told = "met, if its numbers hold: may be off in 4 of 30 samples"
+    assert verdict_table(analyse(made, wanted)).rows[0][1] == told
+    made.attrs["scene"] = made_campaign(2).attrs["scene"]
+    made["reason"] = "sample", np.array([REACHED + words] * 30)
     # One latch cannot decide where seven may be spared, and none makes a ring stall.
     made["latched_joints"] = "sample", np.full(30, 8.0)
     for least, sure in ((7.0, True), (7.5, False), (8.0, False)):

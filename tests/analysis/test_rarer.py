@@ -248,9 +248,9 @@ def test_what_is_not_told_and_why():
     assert set(found.change_input.values) == {"force", "friction", "flat"}
     note = next(line for line in told(found) if line.startswith("changes that were not"))
     assert note == (
-        "changes that were not tried: idle, pair (correlated with another input); flat (means: no "
-        "sample outside the bounds to weigh up); learnt (without a mean and a standard deviation "
-        "of its own); listed (listed in a file)"
+        "changes that were not tried: idle, pair (correlated with another input); flat (means of "
+        "uniform inputs: no samples beyond bounds); learnt (without a mean and a standard "
+        "deviation of its own); listed (listed in a file)"
     )
     # All bounds, and a limit that hardly any sample violates.
     few = analyse(one, limited(np.sort(one.asynchrony_max)[-8] + 1e-9))
