@@ -1,6 +1,7 @@
 """``python -m ringsim`` is the command ``ringsim``: one thread first, then all the rest."""
 
 import resource
+import signal
 import sys
 
 from ringsim.threads import one_thread_from_here_on
@@ -14,6 +15,10 @@ reserve its buffer and tries again for ever.
 def main() -> None:
     """Entry point of the command: numpy must not be loaded before its threads are counted."""
     try:
+        # As Ctrl-C, so that no draft is left; campaigns have their own way to end.
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) is signal.SIG_DFL:  # nohup has it ignored
+                signal.signal(number, signal.default_int_handler)
         one_thread_from_here_on()
         if 0 <= resource.getrlimit(resource.RLIMIT_AS)[0] < _LEAST:
             raise MemoryError

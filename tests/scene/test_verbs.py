@@ -189,6 +189,27 @@ def test_an_interrupted_run_writes_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+WRITING = """
+import os, signal
+from ringsim.__main__ import main
+def replaced(*given):  # the draft is complete, and not in its place yet
+    signal.raise_signal(signal.NUMBER)
+os.replace = replaced
+main()
+"""
+
+
+@pytest.mark.parametrize("number", ["SIGTERM", "SIGHUP"])
+def test_a_signal_to_a_command_that_writes_leaves_no_draft(tmp_path: Path, number: str) -> None:
+    words = ["run", "truss2", "--set", "solver.end_time=0.1", "--set", "solver.step=0.1"]
+    done = subprocess.run(
+        [sys.executable, "-c", WRITING.replace("NUMBER", number), *words, "--out", "run.nc"],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (130, "interrupted")
+    assert not list(tmp_path.iterdir())
+
+
 EARLY = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
