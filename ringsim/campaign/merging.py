@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -85,13 +86,16 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
 
 
 def is_behind(folder: Path) -> bool:
-    """Whether there are results that the merged file cannot have."""
+    """Whether there are results that the merged file cannot have, or a journal that is no file,
+    which merging refuses.
+    """
     if not (folder / DESIGN).exists():
         return False
     merged = folder / MERGED
     if not merged.exists():
         return True
-    newest = max((f.stat().st_mtime for f in (folder / FOLDER).glob("*.journal")), default=0.0)
+    journals = (folder / FOLDER).glob("*.journal")
+    newest = max((f.stat().st_mtime if f.is_file() else math.inf for f in journals), default=0.0)
     return newest > merged.stat().st_mtime and os.access(folder, os.W_OK)
 
 

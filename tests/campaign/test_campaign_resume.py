@@ -115,6 +115,19 @@ def test_results_without_their_design_are_refused(copied):
     assert journals(copied) == before
 
 
+def test_a_journal_that_is_no_file_is_refused_in_one_line(copied):
+    out = copied.folder / "out"
+    journal = next((out / FOLDER).glob("*.journal"))
+    journal.unlink()
+    for target in ("nowhere", journal.name):  # a link to nothing, and to itself
+        journal.symlink_to(target)
+        for words in (("analyse", "out"), ("status", "out")):
+            printed = copied.run(*words, code=2)
+            assert "must be a journal of the campaign, and is no file" in printed
+            assert "Traceback" not in printed
+        journal.unlink()
+
+
 def test_design_that_is_none_is_refused_in_one_line(copied):
     out = copied.folder / "out"
     merged = (out / "campaign.nc").read_bytes()
