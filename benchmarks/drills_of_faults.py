@@ -185,7 +185,7 @@ def signals(folder: Path) -> str:
     ]
     for numbers in sent:
         shutil.rmtree(folder / "out", ignore_errors=True)
-        process = bench.start(*words, solver="")
+        process = bench.start(*words, solver="", fresh=True)
         until(lambda p=process: records(folder / "out") >= 5 or p.poll() is not None, 60.0)
         for number in numbers:
             process.send_signal(number)
@@ -208,7 +208,7 @@ def other_signals(folder: Path) -> str:
     long = {**writers(folder), "run": ("run", "ring18-cable", "--out", "run.nc")}
     numbers = (signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
     for name, number, wait in itertools.product(("run", "plot", "report"), numbers, (0.3, 2.5)):
-        process = bench.start(*long[name])
+        process = bench.start(*long[name], fresh=True)
         time.sleep(wait + CHANCE.random())
         process.send_signal(number)
         told, _ = process.communicate(timeout=20)
@@ -319,7 +319,7 @@ def clock_back(folder: Path) -> str:
     (folder / "drill.toml").write_text(CAMPAIGN)
     bench, faults = Bench(folder), Faults()
     words = ("campaign", "drill.toml", "--workers", 2, "--out", "out")
-    process = bench.start(*words, solver="")
+    process = bench.start(*words, solver="", fresh=True)
     until(lambda: records(folder / "out") >= SAMPLES // 3 or process.poll() is not None, 60.0)
     strike([process.pid], children_of(process.pid))
     process.communicate()

@@ -71,7 +71,7 @@ def killed_campaign(folder: Path, kind: str, ranks: int = 0, kills: int = 4) -> 
     hits, process = 0, None
     for number in range(kills):
         if process is None:
-            process = bench.start(*words, ranks=ranks, solver="")
+            process = bench.start(*words, ranks=ranks, solver="", fresh=True)
         least = SAMPLES * (number + CHANCE.random()) / (kills + 1)
         until(lambda p=process, n=least: records(folder / "out") >= n or p.poll() is not None, 60.0)
         below = children_of(process.pid)
@@ -93,7 +93,7 @@ def killed_campaign(folder: Path, kind: str, ranks: int = 0, kills: int = 4) -> 
         process.communicate(timeout=120)
         require(process.returncode == 0, f"exit code {process.returncode} though workers died only")
     require(hits, "nothing was there to be killed")
-    again = bench.start(*words, ranks=ranks, solver="")
+    again = bench.start(*words, ranks=ranks, solver="", fresh=True)
     told, _ = again.communicate(timeout=120)
     require(again.returncode == 0, told)
     require(same_values(folder / "out/campaign.nc", sound() / "out/campaign.nc"), "other values")
@@ -138,7 +138,7 @@ def killed_command(folder: Path, words: tuple[str, ...], product: str, kills: in
         if number % 2 == 0:  # a first time, and over what is there
             target = folder / product
             shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
-        process = bench.start(*words, solver="")
+        process = bench.start(*words, solver="", fresh=True)
         if number < kills - 2:
             writing += stopped_writing(process, folder, seconds + 60.0)
         else:
@@ -194,7 +194,7 @@ def killed_optimisation(folder: Path) -> str:
     bench, hits = Bench(folder), 0
     words = ("optimise", "best.toml", "--workers", 2, "--out", "best")
     for _ in range(3):
-        process = bench.start(*words)
+        process = bench.start(*words, fresh=True)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(2.0 + 0.3 * seconds * CHANCE.random())
         hits += process.poll() is None
