@@ -254,7 +254,7 @@ def test_the_margin_from_the_start_of_the_last_winch_on() -> None:
     assert found["least_drive_margin"] == pytest.approx(
         virtual_work(ONE, math.radians(60.0)), rel=1e-6
     )
-    best = min(virtual_work(BOTH, math.radians(angle)) for angle in np.linspace(90.0, 179.9, 50))
+    best = min(virtual_work(BOTH, math.radians(angle)) for angle in np.linspace(90.0, 179.9, 8))
     assert found["least_drive_margin_started"] == pytest.approx(best, rel=2e-2)
     at = float(found["least_drive_margin_started_angle"])
     assert found["least_drive_margin_started"] == pytest.approx(
@@ -273,12 +273,12 @@ def test_the_margin_from_the_start_of_the_last_winch_on() -> None:
     assert whole["least_drive_margin_started"] == pytest.approx(best, rel=2e-2)
     alone = late | {"cables__upper__winch__stop_time": 0.0}
     lone = with_margin(opened(0.05), ring(**alone)).values["least_drive_margin_started"]
-    best_alone = min(virtual_work(ONE, math.radians(a)) for a in np.linspace(90.0, 179.9, 50))
+    best_alone = min(virtual_work(ONE, math.radians(a)) for a in np.linspace(90.0, 179.9, 8))
     assert lone == pytest.approx(best_alone, rel=2e-2)
     # A winch that starts after a restart: nothing of the scene before counts.
     later = plain | {"cables__lower__winch__start_time": 0.8}
     after = with_margin(opened(0.05), ring(**later), [(0.5, ring(**plain))]).values
-    from_there = min(virtual_work(BOTH, math.radians(a)) for a in np.linspace(136.8, 179.9, 50))
+    from_there = min(virtual_work(BOTH, math.radians(a)) for a in np.linspace(136.8, 179.9, 8))
     assert after["least_drive_margin_started"] == pytest.approx(from_there, rel=2e-2)
     # A scene before that had its second winch late counts up to the restart.
     both = with_margin(opened(0.05), ring(**plain), [(0.6, ring(**late))]).values
