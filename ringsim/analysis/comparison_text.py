@@ -316,7 +316,7 @@ def _changed(found: xr.Dataset) -> Table:
 
 def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
     """Means of both, their difference with its interval, and the pair that differs most; and the
-    outputs of which a note says that all samples of both are nearly the same.
+    outputs of which a note says that they neither differ nor scatter by what tables tell.
     """
     rows, alike, flat = [], list[str](), dict[str, str]()
     for name, variable in quantities().items():
@@ -372,7 +372,8 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
     columns = 8 if found.attrs["runs"] else len(head)
     same = "the same in both" if found.attrs["runs"] else "the same in each pair"
     notes = [f"{same}: {', '.join(alike)}"] * bool(alike) + _numerical(found, [r[0] for r in rows])
-    notes += [f"all samples within {100 * _ALIKE:g} %: {', '.join(flat.values())}"] * bool(flat)
+    named = ", ".join(flat.values())
+    notes += [f"differences and scatter below {100 * _ALIKE:g} %: {named}"] * bool(flat)
     for name, side in zip(names_of(found), ("first", "second"), strict=True):
         only = found.attrs[f"only_{side}"]
         notes += [f"in {name} alone: {only}"] * bool(only)

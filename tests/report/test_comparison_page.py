@@ -239,6 +239,10 @@ def test_what_is_nearly_the_same_in_both_has_no_panel(
     for each, power in ((one, 3.0), (other, 3.001)):
         values = power + 1e-4 * np.arange(8.0)
         each["peak_motor_power"] = "sample", values, {"units": "W", "long_name": "motor power"}
+    (section,) = [each for each in sections(compare(one, other)).values() if each.name == "outputs"]
+    (table,) = section.tables
+    assert "peak_motor_power" not in [row[0] for row in table.rows]
+    assert "differences and scatter below 0.1 %: peak_motor_power 3" in " ".join(table.notes)
     for _, _, figure in itertools.islice(figures_of_both(compare(one, other), one, other), 2):
         assert not any("Motor power" in axes.get_xlabel() for axes in figure.axes)
         told = " ".join(figure.legends[0].get_title().get_text().split())
