@@ -343,11 +343,9 @@ def damage_content(content: Content, chance: random.Random) -> str:
             content.arrays[name] = dims, np.full(array.shape, text, object), attributes
             return f"{name} = text {text[:40]!r}"
         case 4:
-            content.arrays[name] = (
-                dims,
-                np.ones(array.shape, chance.choice(["i1", "f4"])),
-                attributes,
-            )
+            ones = np.ones(array.shape, chance.choice(["i1", "f4"]))
+            attributes.pop("_FillValue", None)  # of another type
+            content.arrays[name] = dims, ones, attributes
             return f"{name} = ones"
         case 5:
             content.arrays[name] = dims, array[:0] if array.ndim else array[None], attributes

@@ -55,7 +55,9 @@ class EnergyBalance(Output):
         kinetic, elastic, work, lost, wound = series.values.T
         # What a fault takes at the start is not in the first energies any more.
         balance = kinetic - kinetic[0] + elastic - elastic[0] + lost - lost[0] - work
-        scale = max(exchanged(np.array([kinetic, elastic, work - wound, wound]).T), 1e-300)
+        # Where nothing moves, both are round-off: the guard takes no less for what was exchanged.
+        found = exchanged(np.array([kinetic, elastic, work - wound, wound]).T)
+        scale = max(found, run.slight, 1e-300)
         names = [variable.name for variable in self.variables]
         shown = [*series.on_grid()[:4], np.abs(balance).max() / scale]
         return dict(zip(names, shown, strict=True))

@@ -89,6 +89,8 @@ class Run:
     """Scenes that it had before its own, each with the time up to which it did, s."""
     caught: NDArray[np.bool_] | None = None
     """Which latches hold at its end, shape (planes, sections); None if it did not tell."""
+    slight: float = 0.0
+    """Energy (J) so small that a run of less has done nothing worth judging."""
 
     def stretches(self) -> list[tuple[NDArray[np.intp], Scene]]:
         """Numbers of the steps that a scene held for, and this scene, one after the other.

@@ -48,7 +48,8 @@ class Recorder(Remembering):
     """A run of a scene: ``times``, ``angles``, ... of all accepted steps (see ``Instant``).
 
     An engine sets ``status``, ``fate`` and ``reason``, how and why it has ended, which latches have
-    ``caught``, and what its solver took.  ``readings`` are those of every output at these steps.
+    ``caught``, what its solver took, and which energy is ``slight``.  ``readings`` are those of
+    every output at these steps.
     """
 
     changing = ("newton_iterations", "jacobians", "_lost", "_driven")
@@ -67,6 +68,7 @@ class Recorder(Remembering):
         self.gaps: list[float] = []
         self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
         self.caught: NDArray[np.bool_] | None = None
+        self.slight = 0.0
         self.repeats = self.newton_iterations = self.jacobians = 0
 
     def note(self, now: Reading) -> None:
@@ -180,6 +182,7 @@ class Recorder(Remembering):
         run = Run(
             self._scene, Series(times, angles, grid), Series(times, rates, grid),
             lock_times(times, angles, rates), counts, known, tuple(self._before), self.caught,
+            self.slight,
         )  # fmt: skip
 
         @cache

@@ -10,6 +10,7 @@ import numpy as np
 
 from ringsim.parts.faults import AT_ONCE, Faults, Struck
 from ringsim.stepping.control import RunControl
+from ringsim.stepping.guard import SLIGHT
 from ringsim.stepping.instant import (
     Array,
     Energies,
@@ -142,6 +143,7 @@ class Run(Remembering):
     def _set_out(self, first: Instant, scales: Scales, strained: Strained) -> None:
         """Begin with the first state; a ``history`` stands ready."""
         scene = self._scene
+        self.history.slight = SLIGHT * scales.energy
         self._latches = Latches(scene)
         self._locks = locks_of(scene, first.angles, self._latches)
         self._control = RunControl(

@@ -79,3 +79,11 @@ def test_an_arc_is_its_own_mirror_image(engine: str) -> None:
     differences = np.ptp(arc.angles[-1])
     assert differences > 1e-6
     np.testing.assert_allclose(arc.angles, arc.angles[:, :, ::-1], atol=1e-3 * differences)
+
+
+def test_where_nothing_moves_round_off_is_no_imbalance(engine: str) -> None:
+    """A ring that nothing drives: what is exchanged is round-off, as is what is lacking."""
+    still = ring(3, loads__force=0.0, solver__end_time=0.3)
+    told = run(still, engine).history.outcome().values
+    assert np.nanmax(np.abs(told["work"])) < 1e-12
+    assert told["energy_error"] < 1e-6
