@@ -189,7 +189,10 @@ def _temperature(of: Of) -> Answer:
 _ALLOWABLES = {"peak_tension": "limits.tension", "peak_rod_stress": "limits.rod_stress"}
 
 
-@item(ECSS, "4.7.5.2.5, 4.8.2.4 Margin of safety", "Allowable / (worst load x factor) - 1 > 0.")
+@item(
+    ECSS, "4.7.5.2.5, 4.7.5.2.6, 4.8.2.4 Margin of safety",
+    "Allowable / (worst load x factor) - 1 > 0; a factor of 3 for cables against rupture.",
+)  # fmt: skip
 def _strength(of: Of) -> Answer:
     found, margins = outputs(**dict.fromkeys(_ALLOWABLES, ""))(of), margin_table(of.analysis).rows
     for name, limit in _ALLOWABLES.items():
@@ -197,7 +200,8 @@ def _strength(of: Of) -> Answer:
         for told, of_what, worst, margin, sample, beyond in own:
             worst += f" in sample {sample}; beyond it {beyond}"
             found.result.append(f"{told}: margin {margin}, of {of_what} {worst}")
-            found.lacks["factor of safety F"] = "the project's; then (1 + margin) / F - 1"
+            factor = "the project's, of cables against rupture 3"
+            found.lacks["factor of safety F"] = f"{factor}; then (1 + margin) / F - 1"
         if stress := name == "peak_rod_stress" and name not in of.analysis:
             found.lacks[name] = "record.stress = true"
         there = stress or name in of.analysis  # without cables nothing has a tension

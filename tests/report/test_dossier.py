@@ -335,7 +335,9 @@ def test_more_of_a_campaign_is_analysed_once_it_has_it() -> None:
     assert "drawn: 225 to 325 K" in row(rows, "Thermal design")["result"]
     assert "upper_bar" in row(rows, "Tolerance budget")["result"]
     # 80 N over 20 + 11 N, less 1.
-    assert "limits.tension = 80 N: margin +1.58" in row(rows, "Margin of safety")["result"]
+    strength = row(rows, "Margin of safety")
+    assert "limits.tension = 80 N: margin +1.58" in strength["result"]
+    assert "of cables against rupture 3" in strength["result"]
     campaign.attrs["scene"] = scene.replace("ecss-e-st-33-01c", "nasa-std-5017b")
     assert row(rows_of(campaign), "motorization)")["state"] == "in part"
 
