@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import textwrap
+import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from ringsim.analysis.design import (
     REACHED,
     UNKNOWN,
     blocks_of,
+    by_path,
     called,
     drawn,
     endings,
@@ -43,6 +45,7 @@ from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import DOUBT, UNCERTAIN, may_be_off
 from ringsim.outputs.family import Array
+from ringsim.overrides import flat
 from ringsim.sampling.distributions import labels_of
 from ringsim.tables import (
     Table,
@@ -383,6 +386,34 @@ def uncertain_latches(campaign: xr.Dataset) -> Array:
             if said := _LATCHES.search(str(reasons[place])):
                 found[place] = said[1].count(",") + 1 + int(said[2] or 0)
     return found
+
+
+def bars_of(campaign: xr.Dataset, name: str) -> tuple[Array, float]:
+    """The error bar of an output in each sample, and the root mean square of all that are known,
+    which samples without one take; NaN if there is none.
+    """
+    bars = np.where(good(campaign), numbers(campaign, f"{name}_error"), np.nan)
+    known = np.isfinite(bars)
+    error = float(np.sqrt(np.mean(bars[known] ** 2))) if known.any() else np.nan
+    return np.where(known, bars, error), error
+
+
+def slow_latches(campaign: xr.Dataset) -> Array:
+    """How many latches of each sample met a rate that is closer to the least at which they catch
+    than the rate's numerical error.
+    """
+    path, none = "latch.min_rate", np.zeros(campaign.sizes["sample"])
+    varied = {each: name for each, name in by_path(campaign).items() if each.startswith("latch")}
+    if not {"latch_rate", "least_latch_rate_error"} <= {*campaign} or {*varied} - {path}:
+        return none
+    scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
+    least = campaign[varied[path]] if varied else np.atleast_1d(scene.get(path, 0.0))[None]
+    least, rates = np.asarray(least, dtype=float), campaign["latch_rate"].to_numpy()
+    least = least.reshape(len(least), 1, -1)  # of all sections, or of each
+    if not least.any() or least.shape[-1] not in (1, rates.shape[-1]):
+        return none
+    bars, _ = bars_of(campaign, "least_latch_rate")
+    return np.asarray((np.abs(rates - least) < bars[:, None, None]).sum(axis=(1, 2)), dtype=float)
 
 
 _LATCHES = re.compile(rf"whether the latch of ([^;]*?)(?: and (\d+) more)? {UNCERTAIN}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from itertools import takewhile
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,8 +13,15 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ringsim.analysis.campaign_notes import LATE, doubtful, marked, uncertain_latches
-from ringsim.analysis.design import Placement, by_path
+from ringsim.analysis.campaign_notes import (
+    LATE,
+    bars_of,
+    doubtful,
+    marked,
+    slow_latches,
+    uncertain_latches,
+)
+from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import (
     Interval,
     Mask,
@@ -37,7 +43,6 @@ from ringsim.analysis.requirements import (
 )
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
-from ringsim.overrides import flat
 from ringsim.refusal import known_or_nearest
 from ringsim.tables import Table, bound_text, counted, number_text, with_unit
 from ringsim.units import Model
@@ -233,7 +238,7 @@ def judge(
         require_values(campaign, name)
         off = doubted.get(name, none)
         if name == LATCHED or (name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word):
-            latches = uncertain_latches(campaign) + _slow(campaign)
+            latches = uncertain_latches(campaign) + slow_latches(campaign)
             if name == LATCHED:  # so many more or fewer may have caught
                 latches = latches - np.abs(wanted.beyond(numbers(campaign, name)))
             off = off | (latches > 0.0)
@@ -354,23 +359,8 @@ def _close(campaign: xr.Dataset, name: str, wanted: Requirement) -> tuple[Mask, 
     """
     if name == OUTCOME or f"{name}_error" not in campaign:
         return np.zeros(campaign.sizes["sample"], dtype=bool), np.nan
-    bars = np.where(good(campaign), numbers(campaign, f"{name}_error"), np.nan)
-    known = np.isfinite(bars)
-    error = float(np.sqrt(np.mean(bars[known] ** 2))) if known.any() else np.nan
-    apart = np.abs(wanted.beyond(numbers(campaign, name)))
-    return np.asarray(apart < np.where(known, bars, error)), error
-
-
-def _slow(campaign: xr.Dataset) -> Mask:
-    """Which samples met a latch at a rate that is closer to the least at which it catches than the
-    rate's numerical error.
-    """
-    scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
-    least = scene.get("latch.min_rate", 0.0)
-    if not isinstance(least, float) or not least or "latch.min_rate" in by_path(campaign):
-        return np.zeros(campaign.sizes["sample"], dtype=bool)
-    wanted = Requirement(min=least, probability=0.5, confidence=0.5)
-    return _close(campaign, "least_latch_rate", wanted)[0]
+    bars, error = bars_of(campaign, name)
+    return np.asarray(np.abs(wanted.beyond(numbers(campaign, name))) < bars), error
 
 
 IF_HOLD = "if its numbers hold"

@@ -199,7 +199,9 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
         assert any("uncertain whether all latches catch" in n for n in table.notes) != stands
     # A rate of 0.30 rad/s, known to 0.06, may have been below the 0.25 at which latches catch.
     made["reason"] = "sample", np.array([REACHED] * 30)
-    made["least_latch_rate"] = "sample", np.array([*[0.30] * 4, *[0.40] * 26])
+    rates = np.full((30, 2, 4), 0.40)
+    rates[:4, 1, 2] = 0.30
+    made["latch_rate"] = ("sample", "plane", "section"), rates
     made["least_latch_rate_error"] = "sample", np.array([0.06, *[np.nan] * 29])
     wanted = {"outcome": {"is": "deployed", "probability": 0.8, "confidence": 0.9}}
     assert verdict_table(analyse(made, wanted)).rows[0][1] == "met"
@@ -207,6 +209,18 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
     told = "met, if its numbers hold: may be off in 4 of 30 samples"
     assert verdict_table(analyse(made, wanted)).rows[0][1] == told
     made.attrs["scene"] = made_campaign(2).attrs["scene"]
+    law = '{"kind": "uniform", "low": 0.0, "high": 1.0}'
+    says = {"role": "input", "path": "latch.min_rate", "units": "rad/s", "distribution": law}
+    for dims, least, count in (
+        ("sample", np.where(np.arange(30) < 2, 0.25, 0.1), 0),  # two can change no verdict
+        ("sample", np.where(np.arange(30) < 4, 0.25, 0.1), 4),
+        (("sample", "section"), np.tile([0.1, 0.1, 0.25, 0.1], (30, 1)), 4),
+        (("sample", "section"), np.tile([0.25, 0.25, 0.1, 0.25], (30, 1)), 0),
+    ):
+        drawn = made.assign(latch_min_rate=(dims, least, says))
+        (row,) = verdict_table(analyse(drawn, wanted)).rows
+        assert row[1] == (f"met, if its numbers hold: may be off in {count} of 30 samples"
+                          if count else "met")  # fmt: skip
     made["reason"] = "sample", np.array([REACHED + words] * 30)
     # One latch cannot decide where seven may be spared, and none makes a ring stall.
     made["latched_joints"] = "sample", np.full(30, 8.0)
