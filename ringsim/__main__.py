@@ -14,27 +14,41 @@ reserve its buffer and tries again for ever.
 
 def main() -> None:
     """Entry point of the command: numpy must not be loaded before its threads are counted."""
+    asked: list[int] = []
+
+    def stop(number: int, _: object) -> None:
+        """Unwind, so that no draft is left."""
+        asked.append(number)
+        raise KeyboardInterrupt
+
     try:
-        # As Ctrl-C, so that no draft is left; campaigns have their own way to end.
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) is signal.SIG_DFL:  # nohup has it ignored
-                signal.signal(number, signal.default_int_handler)
+        # Campaigns have their own way to end.
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            # nohup has SIGHUP ignored.
+            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                signal.signal(number, stop)
         one_thread_from_here_on()
         if 0 <= resource.getrlimit(resource.RLIMIT_AS)[0] < _LEAST:
             raise MemoryError
         from ringsim.cli import main as command
 
         command()
-    except KeyboardInterrupt:  # while it loads; later ringsim.cli tells the same
-        print("interrupted", file=sys.stderr)
-        sys.exit(130)
-    except (MemoryError, ImportError) as error:
+    except (KeyboardInterrupt, Exception) as error:
+        # While it loads, when an interrupt may come out as an error of what was being loaded; later
+        # ringsim.cli tells the same.
+        if asked or isinstance(error, KeyboardInterrupt):
+            print("interrupted", file=sys.stderr)
+            sys.exit(130)
         # A library that does not fit is told as one that cannot be imported.
-        if isinstance(error, ImportError) and "failed to map segment" not in str(error):
+        if not isinstance(error, MemoryError) and "failed to map segment" not in str(error):
             raise
         told = "there is too little memory: raise the limit (ulimit -v), or ask for less at once"
         print(told, file=sys.stderr)
         sys.exit(2)
+    finally:
+        # Of an interrupt in code that was given as text, as that of named tuples, Python remembers
+        # that nobody caught it, and ends by SIGINT whatever the exit code, until the next such.
+        eval("0")
 
 
 if __name__ == "__main__":

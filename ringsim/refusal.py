@@ -256,7 +256,7 @@ def _meant(text: str, kind: str, wanted: str) -> str:
     if not number or not kind.startswith("float"):
         return ""
     alone, behind = number[0].replace(",", "."), text.strip()[number.end() :].strip()
-    behind = re.sub("degrees?|\N{DEGREE SIGN}$", "deg", behind)
+    behind = re.sub("degrees?|\u00b0$", "deg", behind)
     if not behind or behind == wanted:
         return alone
     value = in_unit(float(alone), behind, wanted)

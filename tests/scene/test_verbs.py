@@ -224,9 +224,17 @@ main()
 
 
 @pytest.mark.quick
-def test_a_command_interrupted_while_it_loads_says_so_in_one_line() -> None:
+@pytest.mark.parametrize("how", [
+    "signal.raise_signal(signal.SIGTERM)",
+    "exec('signal.raise_signal(signal.SIGINT)')",  # as the code of a named tuple
+    "type('', (), {'name': type('', (), {'__set_name__': lambda *_: "
+    "signal.raise_signal(signal.SIGTERM)})()})",  # comes out as a RuntimeError
+])  # fmt: skip
+def test_a_command_interrupted_while_it_loads_says_so_in_one_line(tmp_path: Path, how: str) -> None:
+    code = EARLY.replace("signal.raise_signal(signal.SIGINT)", how)
+    (tmp_path / "early.py").write_text(code)
     done = subprocess.run(
-        [sys.executable, "-c", EARLY], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "early"], capture_output=True, text=True, check=False, cwd=tmp_path
     )
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
 
