@@ -482,7 +482,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
                 f"{name}: {short} of the {held} samples that meet it ended before the antenna was "
                 f"deployed, and might have violated it later{hint}"
             )
-        if one["verdict_may_change"]:
+        # More samples alone would not settle what smaller steps have to.
+        if one["verdict_may_change"] or verdict == Verdict.NOT_YET_SHOWN:
             notes += _doubts(one, str(name))
         signs = [kind.key for kind in KINDS if f" {kind.sign} " in one["requirement_text"]]
         if doubt := doubt_of(name, signs):

@@ -305,7 +305,12 @@ class Lognormal(Continuous):
 
     @property
     def _logarithm(self) -> Normal:
-        deviation = math.sqrt(math.log1p((self.standard_deviation / self.mean) ** 2))
+        # ln(1 + x) = ln(x) to the last digit where x, a square, may overflow.
+        ratio = math.log(self.standard_deviation) - math.log(self.mean)
+        if ratio < 20.0:
+            deviation = math.sqrt(math.log1p((self.standard_deviation / self.mean) ** 2))
+        else:
+            deviation = math.sqrt(2.0 * ratio)
         mean = math.log(self.mean) - 0.5 * deviation**2
         return Normal.model_construct(mean=mean, standard_deviation=deviation)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from scipy import stats
 
 from ringsim.choice import kinds_of
-from ringsim.sampling.distributions import Distribution
+from ringsim.sampling.distributions import Distribution, Lognormal
 from ringsim.sampling.table import AnyDistribution
 
 pytestmark = pytest.mark.quick
@@ -97,6 +99,15 @@ def test_mean_and_deviation_are_those_asked_for(kind):
     assert mean == pytest.approx(EXAMPLES[kind]["mean"], rel=1e-9)
     deviation = np.sqrt(weights @ (values - mean) ** 2)
     assert deviation == pytest.approx(EXAMPLES[kind]["standard_deviation"], rel=1e-9)
+
+
+def test_a_lognormal_of_any_width_is_drawn():
+    """exp(ln(m) - ln(1 + (s / m)^2) / 2) is the median, m^2 / s where s is far larger than m."""
+    for mean, deviation in ((1e5, 1e13), (1e5, 1e14), (1e5, 1e308), (1e-300, 1e300)):
+        law = Lognormal(mean=mean, standard_deviation=deviation)
+        asked = 2.0 * math.log(mean) - math.log(deviation)
+        found = math.log(max(law.quantile(np.array([0.5]))[0], 5e-324))
+        assert found == pytest.approx(max(asked, math.log(5e-324)), rel=1e-12)
 
 
 def test_discrete_values_occur_as_often_as_asked():
