@@ -356,7 +356,7 @@ def marked(table: Table, analysis: xr.Dataset, column: int = 0) -> Table:
 # Outputs that runs call uncertain themselves, and the mark on them.
 
 
-DOUBTED = f"{DOUBT.strip()} may be off, since steps are too long for the shocks of locks"
+DOUBTED = f"{DOUBT.strip()} may be off, since steps are too long at locks"
 """What is said below a table with that mark."""
 OFF = "may_be_off"
 """Attribute of an analysis with what ``off_note`` tells, as JSON."""

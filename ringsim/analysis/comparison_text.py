@@ -110,8 +110,8 @@ def _doubts(found: xr.Dataset) -> Iterator[str]:
         told.append(f"{', '.join(outputs)} in {where}")
     if told:
         yield (
-            f"numbers with{DOUBT} may be off, as their runs say, because steps were too long for "
-            f"the shocks of locks: {'; '.join(told)}"
+            f"numbers with{DOUBT} may be off, as their runs say, because steps were too long "
+            f"at locks: {'; '.join(told)}"
         )
 
 

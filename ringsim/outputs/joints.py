@@ -209,7 +209,7 @@ class Latching(Output):
         ),
         Variable(
             "least_latch_rate", (), "rad/s",
-            "smallest opening rate at which a V-joint first met its latch",
+            "smallest opening rate at which a V-joint first met its latch; missing unless all did",
             error_bar=ErrorBar("least latch rate", safety=3.0),
             summary=("least latch rate", "10.3g"), worse="smaller", least_of="latch_rate",
         ),
@@ -231,11 +231,6 @@ class Latching(Output):
             "latched": caught,
             "latched_joints": caught.sum(),
         }
-
-    def shocks(self, run: Run, series: Series) -> dict[str, float]:
-        """When the joint met its latch that was the slowest."""
-        rates = run.history.rates
-        return _at_lock("least_latch_rate", run, -rates) if np.isfinite(rates).all() else {}
 
 
 class FastestLatch(Output):
@@ -262,10 +257,6 @@ class FastestLatch(Output):
         return {"peak_latch_rate": np.fmax.reduce(rates, axis=None)} | LARGEST.at(
             run, run.locks, rates
         )
-
-    def shocks(self, run: Run, series: Series) -> dict[str, float]:
-        """When the joint met its latch that was the fastest."""
-        return _at_lock("peak_latch_rate", run, run.history.rates)
 
 
 def _at_lock(name: str, run: Run, values: Array) -> dict[str, float]:

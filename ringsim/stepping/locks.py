@@ -225,20 +225,25 @@ ON_STOP = 1e-9
 
 
 class Meeting(NamedTuple):
-    """A V-joint, (plane, section), comes to 180 deg at a time (s) and an opening rate (rad/s)."""
+    """A V-joint, (plane, section), comes to 180 deg at a time (s) and an opening rate (rad/s), of
+    which such a share is uncertain.
+    """
 
     place: tuple[int, int]
     time: float
     rate: float
+    unsure: float
 
 
 class History(NamedTuple):
-    """Opening rate (rad/s) at which each V-joint first came to 180 deg, and when (s) its latch
-    caught, both of shape (planes, sections); NaN if that did not happen.
+    """Opening rate (rad/s) at which each V-joint first came to 180 deg, when (s) its latch caught,
+    and which share of the rate is uncertain, all of shape (planes, sections); NaN if that did not
+    happen.
     """
 
     rates: Array
     caught_at: Array
+    unsure: Array
 
 
 class Latches(Remembering):
@@ -291,17 +296,17 @@ class Latches(Remembering):
 
     def meet(self, met: Iterable[Meeting]) -> None:
         """Let those catch that can, of meetings in the order of their times."""
-        for place, time, rate in met:
+        for place, time, rate, _ in met:
             if self._present and rate >= self._least[place] and time < self._fails[place]:
                 self.caught[place] = True
 
 
 def history(scene: "Scene", times: Array, angles: Array, rates: Array) -> History:
     """What became of the latches of a scene in a run; see ``meetings``."""
-    latches, found = Latches(scene), History(*np.full((2, *angles.shape[1:]), np.nan))
+    latches, found = Latches(scene), History(*np.full((3, *angles.shape[1:]), np.nan))
     for one in meetings(times, angles, rates):
         if np.isnan(found.rates[one.place]):
-            found.rates[one.place] = one.rate
+            found.rates[one.place], found.unsure[one.place] = one.rate, one.unsure
         latches.meet([one])
         if latches.caught[one.place] and np.isnan(found.caught_at[one.place]):
             found.caught_at[one.place] = one.time
@@ -312,31 +317,51 @@ def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
     """Every arrival at 180 deg, of angles (rad) and rates (rad/s) of shape (n, planes, sections) at
     times (s).
 
-    The step that meets a stop brakes, so that the rate is that of its begin, with the acceleration
-    of the steps before over the angle that is left; unless it ends on the stop, whose rate is then
-    that of its end.
+    The step that meets a stop brakes, so that the rate is carried on from its begin; unless it ends
+    on the stop, whose rate is then that of its end.
     """
-    past = angles - math.pi
+    past, found = angles - math.pi, list[tuple[int, float, tuple[int, int]]]()
     for step, plane, section in np.argwhere((past[:-1] < 0.0) & (past[1:] >= 0.0)).tolist():
-        ends, place = slice(step, step + 2), (plane, section)
-        own, speed = past[:, plane, section], rates[:, plane, section]
-        time = crossing(times[ends], own[ends], speed[ends])
+        ends, at = slice(step, step + 2), (plane, section)
+        time = crossing(times[ends], past[(ends, *at)], rates[(ends, *at)])
+        found.append((step, time, at))
+    for step, time, place in found:
+        own, speed = past[(slice(None), *place)], rates[(slice(None), *place)]
         if own[step + 1] < ON_STOP:
-            met = max(float(speed[step + 1]), 0.0)
-        else:
-            bend = _acceleration(times, own, speed, step)
-            met = math.sqrt(max(max(speed[step], 0.0) ** 2 - 2.0 * bend * own[step], 0.0))
-        yield Meeting(place, time, met)
+            yield Meeting(place, time, max(float(speed[step + 1]), 0.0), 0.0)
+            continue
+        before = time - _TOGETHER * (times[step + 1] - times[step])
+        jerked = any(step - 2 <= k <= step and when < before for k, when, _ in found)
+        yield Meeting(place, time, *_carried(times, own, speed, step, jerked=jerked))
 
 
-def _acceleration(times: Array, past: Array, rates: Array, step: int) -> float:
-    """That of the two steps before, the smaller one; none where they differ in sign, or one touched
-    the stop.
+_TOGETHER = 0.05
+"""Share of a step within which two joints lock together: none has jerked the other before."""
 
-    A lock of another joint jerks all rates within one step: foretold from that step alone, rates
-    of coarse runs were off by half, or negative.
+
+def _carried(
+    times: Array, past: Array, rates: Array, step: int, *, jerked: bool
+) -> tuple[float, float]:
+    """Rate (rad/s) that a joint has on its stop, carried on from the begin of a step, and the share
+    of it that is uncertain; ``jerked`` is whether another joint has locked within three steps.
+
+    v^2 = v0^2 + 2 a s, with the acceleration a of the step before; of a jerked joint with the
+    smaller one of two, since a jerk does not go on (rates were off by half, or negative), and none
+    where they differ in sign or one touched the stop.  The uncertain share is by what these differ
+    from one another, and from a parabola of v^2 over the angle.
     """
+    start, left = max(float(rates[step]), 0.0), -float(past[step])
     if step < 2 or (past[step - 2 : step] >= 0.0).any():
-        return 0.0
-    one, two = np.diff(rates[step - 2 : step + 1]) / np.diff(times[step - 2 : step + 1])
-    return float(min(one, two, key=abs)) if one * two > 0.0 else 0.0
+        return start, 0.0
+    speeds, places = rates[step - 2 : step + 1], past[step - 2 : step + 1]
+    one, two = np.diff(speeds) / np.diff(times[step - 2 : step + 1])
+    steady = one * two > 0.0
+    bends = float(min(one, two, key=abs)) if steady else 0.0, float(two)
+    ends = [max(start**2 + 2.0 * bend * left, 0.0) ** 0.5 for bend in bends]
+    rate, found = (ends[1] if steady and not jerked else ends[0]), list(ends)
+    ways, squares = np.diff(places), np.sign(speeds) * speeds**2
+    if ways.all() and ways.sum():
+        first, second = np.diff(squares) / ways
+        curved = left * (left + ways[1]) * (second - first) / ways.sum()
+        found.append(max(float(squares[2] + left * second + curved), 0.0) ** 0.5)
+    return rate, (max(found) - min(found)) / max(found) if any(found) else 1.0

@@ -108,7 +108,7 @@ def test_what_runs_call_uncertain_is_marked_wherever_it_is_told() -> None:
     found = analyse(made)
     text = "\n".join(all_told(found))
     line = (
-        "? may be off, since steps are too long for the shocks of locks: peak_tension in 2 of 8 "
+        "? may be off, since steps are too long at locks: peak_tension in 2 of 8 "
         "samples, asynchrony_max in 1, nothing in 1; set solver.tolerance = 1.7e-05 (2 to 3 times "
         "the steps)"
     )
