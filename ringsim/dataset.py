@@ -2,6 +2,7 @@
 
 import json
 import platform
+import tomllib
 import warnings
 from collections.abc import Hashable
 from datetime import UTC, datetime
@@ -126,7 +127,13 @@ def require_declared(found: xr.Dataset, file: Path) -> None:
             _ = json.loads(value) if name in _JSON and value else None
         except ValueError as error:
             raise InputError(f"{file}: its attribute {name} is no JSON: {error}: {cure}") from None
+    try:
+        tomllib.loads(found.attrs["scene"])
+    except ValueError as error:
+        raise InputError(f"{file}: its attribute scene is no TOML: {error}: {cure}") from None
     for name, variable in found.variables.items():
+        if name in found.dims and variable.dims != (name,):
+            raise InputError(f"{file}: {name} must have the dimension {name} alone: {cure}")
         if told := _undeclared(str(name), variable, found):
             raise InputError(f"{file}: {name} {told}: {cure}")
 

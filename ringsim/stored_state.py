@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,8 +71,11 @@ def read_state(path: str | Path, at: float | None = None) -> StoredState:
     if not path.is_file():
         raise InputError(f"{path}: no such file (--from takes the netCDF file of a run)")
     try:
-        with xr.open_dataset(path, engine="netcdf4") as opened:
-            data = opened.load()
+        with warnings.catch_warnings():
+            # Of a damaged file, which is refused below.
+            warnings.filterwarnings("ignore", "Duplicate dimension", UserWarning)
+            with xr.open_dataset(path, engine="netcdf4") as opened:
+                data = opened.load()
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be read as netCDF: {error}") from None
     if "state" not in data:

@@ -222,7 +222,8 @@ def _settings(found: xr.Dataset) -> Table:
     paths, count = found["setting"].values.tolist(), found.sizes["setting"]
     columns = (found[f"setting_{side}"].values.tolist() for side in ("first", "second"))
     rows = [(str(p), str(a), str(b)) for p, a, b in zip(paths, *columns, strict=True)]
-    notes = [f"and {count - _NAMED} more: all are in the file of --out"] * (count > _NAMED)
+    more = f"and {count - _NAMED} more; ringsim compare --out FILE.nc stores all"
+    notes = [more] * (count > _NAMED)
     return Table(("differs in", *names_of(found)), rows[:_NAMED], notes, left=3)
 
 
@@ -283,8 +284,8 @@ def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
     known = any(bool(np.isfinite(each).any()) for each in every)
     for name in names:
         errors = found[f"{name}_numerical_error"].values
-        size, apart = float(np.sqrt(np.nansum(errors**2))), abs(found[f"{name}_difference"].item())
-        if np.isfinite(errors).any() and apart <= size:
+        size = float(np.sqrt(np.nansum(errors**2)))
+        if _within(found, name):
             factor, unit = readable(quantities()[name].units, size)
             within.append(f"{name} ({with_unit(number_text(factor * size, 2), unit)})")
     if not names:
@@ -310,7 +311,7 @@ def _changed(found: xr.Dataset) -> Table:
     rows = [(str(sample), str(first), str(second)) for sample, first, second in listed]
     notes = [f"the outcome differs in {changed} of {pairs}"]
     if changed > _NAMED:
-        notes.append(f"{_NAMED} of them are listed, all are in the file of --out")
+        notes.append(f"{_NAMED} of them are listed; ringsim compare --out FILE.nc stores all")
     return Table(("sample", *(f"in {name}" for name in names_of(found))), rows, notes, left=3)
 
 
@@ -391,9 +392,16 @@ def _percent(first: float, second: float) -> str:
     return f"{percent:+.3g}" if abs(percent) < _FRACTIONS else f"{percent:+.0f}"
 
 
+def _within(found: xr.Dataset, name: str) -> bool:
+    """Whether the error bars, as far as they are known, may have made a difference."""
+    errors = found[f"{name}_numerical_error"].values
+    apart = abs(found[f"{name}_difference"].item())
+    return bool(np.isfinite(errors).any() and apart <= np.sqrt(np.nansum(errors**2)))
+
+
 def _worse(found: xr.Dataset, name: str) -> str:
     """In which of the two an output is worse, where the interval of the difference leaves out zero;
-    of two runs by the difference itself.
+    of two runs by the difference itself.  In neither where numerical errors may have made it.
     """
     ends = found[f"{name}_difference_interval"].values
     if found.attrs["runs"]:
@@ -401,7 +409,7 @@ def _worse(found: xr.Dataset, name: str) -> str:
     ends = np.sort(quantities()[name].badness * ends)
     first, second = names_of(found)
     size = np.abs(found[f"{name}_mean"].values).max()
-    if abs(found[f"{name}_difference"].item()) < _ALIKE * size:
+    if abs(found[f"{name}_difference"].item()) < _ALIKE * size or _within(found, name):
         return "-"
     return second if ends[0] > 0.0 else first if ends[1] < 0.0 else "-"
 

@@ -582,7 +582,7 @@ def rarer_table(analysis: xr.Dataset) -> Table:
             f"time: standard deviation, range or probability {100 * STEP:g} % smaller, or mean "
             f"moved by {100 * STEP:g} % of the standard deviation to the side with fewer "
             "violations; the interval is that of the change, not of the probability as drawn; by "
-            f"chance alone, fewer than one requirement in 20 would be listed ({count} tried)"
+            f"chance alone, fewer than one requirement in 20 would be listed ({count} changes)"
         )
     notes += [f"further significant changes: {', '.join(more)}"] * bool(more)
     if quiet and which:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from string import ascii_lowercase
 from typing import NamedTuple
 
 import numpy as np
@@ -511,11 +512,12 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
     )  # fmt: skip
     notes = [OF_ERRORS] * any(any(c != "-" for c in (row[3], row[6])) for row in rows)
     untold = dict.fromkeys(row[-1].partition(" (")[2].rstrip(")") for row in rows if row[-1] != "-")
-    # What is not measured is told once: below all rows, or by stars that rows refer to.
-    stars = {words: "*" * k * (len(untold) > 1) for k, words in enumerate(filter(None, untold), 1)}
-    for words, star in stars.items():
-        rows = [(*row[:-1], row[-1].replace(f" ({words})", f" {star}".rstrip())) for row in rows]
-        notes.append(f"{star} {words}".lstrip())
+    # What is not measured is told once: below all rows, or by letters that rows refer to.
+    several, words = len(untold) > 1, list(filter(None, untold))
+    for letter, unknown in zip(ascii_lowercase, words, strict=False):
+        mark = f"({letter})" * several
+        rows = [(*row[:-1], row[-1].replace(f" ({unknown})", f" {mark}".rstrip())) for row in rows]
+        notes.append(f"{mark} {unknown}".lstrip())
     tables = [marked(Table(head, rows, notes), analysis)] if every else []
     if "balance" in analysis.dims:
         columns = (analysis[f"balance_{word}"].values.tolist()
@@ -536,7 +538,7 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
 
 OF_ERRORS = (
     "numerical, engines: root mean square of the error bars, and of the differences of the "
-    "engines, over the samples that have them; samples err alike, so that their mean errs as much"
+    "engines, over the samples that have them; they do not average out: the mean is as wrong"
 )
 """What the columns of the error budget are."""
 _NO_ERROR = 1e-7

@@ -387,7 +387,8 @@ def status_lines(campaign: Folder) -> list[str]:
         about = time_left(campaign, left, spent / np.maximum(ended, 1), workers)
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     if left and (changed := other_build(campaign)):
-        lines.append(f"  not continued  {changed.strip()}: what is left is refused")
+        on = "; its workers go on with the build that began it" if workers else ""
+        lines.append(f"  not continued  {changed.strip()}: what is left is refused{on}")
     return [*lines, f"  next           {_next(campaign, left, growth)}"]
 
 

@@ -475,4 +475,12 @@ def campaign_of(
                 f"{path.name}: {where}: runs of this scene do not have this output, because the "
                 f"scene has no {absent[0]}: leave it out, or {supply(absent[0])}"
             )
+    joints = len(varied.structure.planes) * varied.structure.sections
+    for name in ("locked_joints", "latched_joints"):
+        wanted_of = specification.requirements.get(name)
+        if wanted_of is not None and wanted_of.min is not None and wanted_of.min > joints:
+            raise InputError(
+                f"{path.name}: requirements.{name}.min = {wanted_of.min:g}: must be at most "
+                f"{joints}, the V-joints of this scene: no sample could keep to it"
+            )
     return Campaign(path, text, specification, varied)

@@ -293,10 +293,9 @@ class DriveMargins(Output):
     )  # fmt: skip
 
     def told(self, values: Values, span_names: SpanNames) -> str:
-        """As "at 20.5 deg and 0.1 s: NOT enough"; of a plane whose own cable falls short by more
-        than the mean of both, "at 20.5 deg and 0.1 s: enough, but one plane has -1.000", or "NOT
-        enough, and one plane even -0.951"; where that is before the last winch starts, "(-0.110
-        from the start of the last winch on)".
+        """As "at 20.5 deg and 0.1 s: NOT enough"; where that is before the last winch starts,
+        "(-0.110 from the start of the last winch on)"; of a plane whose own cable falls short by
+        more than the mean of both, ", but one plane has -1.000", or ", and one plane even -0.951".
         """
         names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
@@ -308,7 +307,7 @@ class DriveMargins(Output):
         own = f"{also} {plane:.3f}" if plane < min(margin, 0.0) - 5e-4 else ""
         started = float(values.get("least_drive_margin_started", math.nan))
         then = f" ({started:.3f} from the start of the last winch on)" * (started > margin + 5e-4)
-        return f"at {angle:.4g} deg and {time:.4g} s: {word}{own}{then}"
+        return f"at {angle:.4g} deg and {time:.4g} s: {word}{then}{own}"
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Nothing: ``ringsim.rigid.margin`` knows them."""

@@ -21,7 +21,7 @@ from ringsim import build
 from ringsim.files import DESIGN, campaign_cure, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
-from ringsim.refusal import InputError, known_or_nearest
+from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.sampling.columns import Table, add_inputs, read_inputs
 from ringsim.storage.result import MISSING_COUNT
 from ringsim.units import Model
@@ -164,6 +164,11 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
         raise InputError(
             f"{path}: this is not the design of a campaign, it has no attribute {absent[0]}: "
             "choose another folder"
+        )
+    if str(attributes.get("fidelity", "full")).upper() not in Fidelity.__members__:
+        raise InputError(
+            f"{path}: its fidelity is {show(attributes['fidelity'])}: the file is damaged or "
+            "changed: choose another folder"
         )
     return table, attributes
 

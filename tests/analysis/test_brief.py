@@ -131,13 +131,13 @@ def test_what_differs_by_less_than_its_numerical_error_is_one_value():
     (budget, *_) = error_tables(required)
     assert "peak_tension" in [each[0] for each in budget.rows]
     assert budget.notes[-2:] == [OF_ERRORS, "engines not measured"]
-    # Of outputs of which not the same is measured by stars.
+    # Of outputs of which not the same is measured by letters.
     checked = required.copy()
     checked["asynchrony_max_error_of_mean"][:] = [0.1, np.nan, 0.2]
     (budget, *_) = error_tables(checked)
     marks = {row[0]: row[-1] for row in budget.rows}
-    assert marks == {"asynchrony_max": "engines *", "peak_tension": "numerical **"}
-    assert budget.notes[-2:] == ["* numerical not measured", "** engines not measured"]
+    assert marks == {"asynchrony_max": "engines (a)", "peak_tension": "numerical (b)"}
+    assert budget.notes[-2:] == ["(a) numerical not measured", "(b) engines not measured"]
     why = "no sample is farther from the mean than the numerical error"
     less = f"not told, because {why}: peak_tension"
     assert less in what_matters(required).notes

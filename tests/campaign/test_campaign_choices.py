@@ -113,3 +113,11 @@ def test_choices_reach_the_runs_and_the_merged_file(bench):
     more = bench.run(*start[:2], "--out", "out", solver="", code=2)
     assert "this folder has another campaign (its scene differs: solver.tolerance" in more
     assert "is not in the range" in bench.run(*start[:2], "--samples", 0, code=2)
+
+
+@pytest.mark.quick
+def test_more_joints_than_the_scene_has_cannot_be_required(tmp_path):
+    law = "\n[requirements]\nlatched_joints = { min = %s, probability = 0.9, confidence = 0.9 }\n"
+    load_campaign(written(tmp_path, CHOOSING + law % 4))
+    with pytest.raises(InputError, match=r"latched_joints\.min = 5: must be at most 4, the V-joi"):
+        load_campaign(written(tmp_path, CHOOSING + law % 5))

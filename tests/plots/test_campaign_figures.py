@@ -69,7 +69,7 @@ def test_lock_order_counts_ties_by_halves_and_what_stays_open() -> None:
     assert last.sum() == pytest.approx(2 / 3)
     assert never[0, 1] == pytest.approx(1 / 3)
     assert never.sum() == pytest.approx(1 / 3)
-    assert "The last joint is counted in the 2 samples in which all" in words(lock_order(campaign))
+    assert "the last joint is counted in the 2 samples in which all" in words(lock_order(campaign))
 
 
 def test_bars_of_few_samples_have_their_share_in_words() -> None:

@@ -326,6 +326,6 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     legend(figure, [grid[0]])
     locks = locks_of(campaign)
     done = int(np.isfinite(locks).all(axis=(1, 2)).sum())
-    note = f"The last joint is counted in the {done} samples in which all have come to 180 deg."
+    note = f"the last joint is counted in the {done} samples in which all have come to 180 deg"
     head(figure, campaign, "Lock order", f"{told(campaign, len(locks))}; {note}")
     return figure

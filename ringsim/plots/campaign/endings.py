@@ -318,7 +318,7 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
         for row, look in zip(own, cases, strict=False):
             axes.plot(sections, row, marker="o", markersize=3, **look)
         known = np.isfinite(own).any(axis=0)
-        if not cases:
+        if not cases and known.any():
             low, lower, middle, upper, high = bands(own[:, known])
             at = sections[known]
             axes.vlines(at, low, high, color=style.BLUE, linewidth=1.0, label="0-100 %")
