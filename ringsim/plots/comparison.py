@@ -1,7 +1,7 @@
 """Figures of two campaigns, or runs, beside each other, and of either beside measured data."""
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
@@ -199,7 +199,8 @@ def values(found: xr.Dataset, both: Both, names: list[str]) -> Figure:
 def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Array]]]) -> Figure:
     """A panel a quantity over time: of runs their course, of campaigns that of ``_lines_of``, with
     the range of all samples, also of those that are over; ``read`` has times and rows of both by
-    quantity.
+    quantity.  Each over its own time where one, as a fast test beside a slow flight, takes much
+    longer.
     """
     single, lines = "sample" not in both[0].dims, _lines_of(both)
     names = [
@@ -208,9 +209,13 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
     ]
     figure = Figure(figsize=(8.2, 2.3 * len(read) + 1.2))
     grid = figure.subplots(len(read), 1, sharex=True, squeeze=False)[:, 0]
+    ends = [_until((each,)) for each in both]
+    apart = max(ends) > _APART * min(ends) > 0.0
     for axes, (name, rows_of) in zip(grid, read.items(), strict=True):
         drawn = []
-        for (time, rows), called, (colour, dashes) in zip(rows_of, names, _LOOKS, strict=True):
+        for each, called, (colour, dashes), end in zip(rows_of, names, _LOOKS, ends, strict=True):
+            (time, rows), most = each, end if apart else 1.0
+            time = time / most
             drawn.append(rows)
             if len(rows) > 1:
                 axes.fill_between(time, rows[0], rows[-1], color=colour, alpha=0.2, linewidth=0.0)
@@ -222,7 +227,11 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         if name != "opening_angle":
             style.span_sizes(axes, np.concatenate([each.ravel() for each in drawn]))
     grid[-1].set_xlabel(style.label(both[0]["time"]))
-    grid[0].set_xlim(0.0, _until(both))
+    grid[0].set_xlim(0.0, 1.0 if apart else max(ends))
+    if apart:
+        first, second = map("{} s in {}".format, (number_text(e, 3) for e in ends), names_of(found))
+        grid[-1].set_xlabel(f"Share of {first} and of {second}")
+        grid[-1].xaxis.set_major_formatter(PercentFormatter(1.0))
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
     if not single:
@@ -232,8 +241,8 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         )
         cut = [
             f"{called}: {ran_on.partition(': ')[2]}"
-            for each, called in zip(both, names_of(found), strict=True)
-            if (ran_on := shown_until(each)[1]) and _last(each) > _until(both)
+            for each, called, end in zip(both, names_of(found), ends, strict=True)
+            if (ran_on := shown_until(each)[1]) and _last(each) > (end if apart else max(ends))
         ]  # fmt: skip
         figure.legends[0].set_title("\n".join([*told, _OVER, *cut]))
         figure.legends[0].get_title().set_fontsize(9)
@@ -281,11 +290,16 @@ _DEPLOYED = {"opening_angle": 180.0, "asynchrony": 0.0}
 """What a deployed ring has: its last record may be before its last lock."""
 
 
-def _until(both: Both) -> float:
-    """Time up to which courses of both are drawn, s."""
+_APART = 3.0
+"""How many times as long as the other one has to take for each to have an axis of its own: the
+shorter one would have less than a third of it."""
+
+
+def _until(several: Sequence[xr.Dataset]) -> float:
+    """Time up to which courses of all are drawn, s."""
     return max(
         min(_last(each), shown_until(each)[0]) if "sample" in each.dims else _last(each)
-        for each in both
+        for each in several
     )
 
 

@@ -203,6 +203,24 @@ def test_a_sample_that_runs_on_ends_no_axis_of_a_comparison() -> None:
     assert told.endswith("\nground: 1 sample goes on, until 10 s.")
 
 
+@pytest.mark.parametrize("slower", [2.0, 10.0])
+def test_a_slow_flight_and_a_fast_test_have_an_axis_each(slower: float) -> None:
+    one = made_campaign(8)
+    other = one.assign_coords(time=slower * one["time"])
+    other = other.assign({n: slower * one[n] for n in ("final_time", "deployment_time")})
+    found = compare(one, other, ("ground", "flight"))
+    drawn = {name: figure for name, _, figure in figures_of_both(found, one, other)}
+    axes = drawn["courses"].axes
+    fast, slow = axes[0].lines
+    if slower > 3.0:  # the same courses over the share of their own time
+        assert axes[0].get_xlim() == (0.0, 1.0)
+        assert fast.get_xydata() == pytest.approx(slow.get_xydata())
+        assert axes[-1].get_xlabel() == "Share of 10 s in ground and of 100 s in flight"
+    else:
+        assert axes[0].get_xlim() == (0.0, 20.0)
+        assert 2.0 * fast.get_xdata() == pytest.approx(slow.get_xdata())
+
+
 def test_samples_that_were_cut_off_are_told_and_what_differs_comes_first(
     both: tuple[xr.Dataset, xr.Dataset],
 ) -> None:
