@@ -221,8 +221,10 @@ def sound_run() -> xr.Dataset:
         (lambda run: run.assign_attrs(title=3), "its attribute title must be a text"),
         (lambda run: run.assign_attrs(requirements="{"), "its attribute requirements is no JSON"),
         (lambda run: run.assign_attrs(scene="%s {0}"), "its attribute scene is no TOML"),
-        (lambda run: run.drop_vars("section").assign(section=("other", [1, 2])),
-         "section must have the dimension section alone"),
+        (
+            lambda run: run.drop_vars("section").assign(section=("other", [1, 2])),
+            "section must have the dimension section alone",
+        ),
     ],
 )
 def test_a_run_that_is_not_as_declared_is_refused_with_what_is_wrong(change, message):

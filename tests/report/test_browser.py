@@ -185,7 +185,8 @@ MEASURE = """<script>
 const seen = {boxes: {}, cells: [], room: 0, rows: [], drawn: []};
 for (const row of document.querySelectorAll("main tbody tr")) {
   const words = Math.max(...[...row.cells].map(cell => cell.textContent.length));
-  if (words < 30) seen.rows.push(row.offsetHeight);
+  if (row.closest("#requirements")) seen.verdict = row.cells[1].getBoundingClientRect().right;
+  else if (words < 30) seen.rows.push(row.offsetHeight);
 }
 const figure = document.querySelector("figure");
 for (const _ of figure ? [1, 2, 3] : []) {  // as it is, enlarged, and as it was
@@ -232,6 +233,7 @@ def test_tables_are_whole_on_a_wide_page_and_scroll_in_their_box_on_a_narrow_one
     assert min(seen["cells"]) >= 200  # px: some words a line
     # On a narrow page no row is high for words that are off the screen, and figures fit it.
     assert width == 1400 or max(seen["rows"]) <= 30
+    assert seen["verdict"] <= min(width, 420)  # with all of its words
     first, large, again = seen["drawn"]
     assert first == again < width
     assert (large >= 640) == (width == 500 or first >= 640)
