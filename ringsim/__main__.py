@@ -3,6 +3,7 @@
 import resource
 import signal
 import sys
+from typing import Any
 
 from ringsim.threads import one_thread_from_here_on
 
@@ -15,6 +16,7 @@ reserve its buffer and tries again for ever.
 def main() -> None:
     """Entry point of the command: numpy must not be loaded before its threads are counted."""
     asked: list[int] = []
+    before: dict[int, Any] = {}
 
     def stop(number: int, _: object) -> None:
         """Unwind, so that no draft is left."""
@@ -26,7 +28,7 @@ def main() -> None:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             # nohup has SIGHUP ignored.
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
-                signal.signal(number, stop)
+                before[number] = signal.signal(number, stop)
         one_thread_from_here_on()
         if 0 <= resource.getrlimit(resource.RLIMIT_AS)[0] < _LEAST:
             raise MemoryError
@@ -49,6 +51,8 @@ def main() -> None:
         # Of an interrupt in code that was given as text, as that of named tuples, Python remembers
         # that nobody caught it, and ends by SIGINT whatever the exit code, until the next such.
         eval("0")
+        for which, handler in before.items():
+            signal.signal(which, handler)
 
 
 if __name__ == "__main__":

@@ -100,14 +100,14 @@ def number_text(value: float, digits: int = 4) -> str:
     """A number with so many digits, or a dash.
 
     >>> number_text(0.25), number_text(1092.3, 3), number_text(1.2e11), number_text(math.nan)
-    ('0.25', '1090', '1.2e+11', '-')
+    ('0.25', '1092', '1.2e+11', '-')
     """
-    return without_power(f"{value:.{digits}g}") if math.isfinite(value) else "-"
+    return without_power(f"{value:.{digits}g}", value) if math.isfinite(value) else "-"
 
 
-def without_power(text: str) -> str:
-    """A number in words as people write it below a million: 1090, not 1.09e+03."""
-    return f"{Decimal(text):f}" if re.search(r"e\+0[1-5]$", text) else text
+def without_power(text: str, value: float) -> str:
+    """A number in words as people write it below a million: 1092, not 1.09e+03."""
+    return f"{value:.0f}" if re.search(r"e\+0[1-5]$", text) else text
 
 
 def bound_text(value: float, digits: int = 4, *, upper: bool) -> str:

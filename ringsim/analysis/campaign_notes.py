@@ -403,17 +403,20 @@ def slow_latches(campaign: xr.Dataset) -> Array:
     than the rate's numerical error.
     """
     path, none = "latch.min_rate", np.zeros(campaign.sizes["sample"])
-    varied = {each: name for each, name in by_path(campaign).items() if each.startswith("latch")}
-    if not {"latch_rate", "least_latch_rate_error"} <= {*campaign} or {*varied} - {path}:
+    varied = by_path(campaign)
+    parts = any(each == "latch" or each.startswith(("latch[", f"{path}[")) for each in varied)
+    if not {"latch_rate", "least_latch_rate_error"} <= {*campaign} or parts:
         return none
     scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
-    least = campaign[varied[path]] if varied else np.atleast_1d(scene.get(path, 0.0))[None]
+    drawn = path in varied
+    least = campaign[varied[path]] if drawn else np.atleast_1d(scene.get(path, 0.0))[None]
     least, rates = np.asarray(least, dtype=float), campaign["latch_rate"].to_numpy()
     least = least.reshape(len(least), 1, -1)  # of all sections, or of each
     if not least.any() or least.shape[-1] not in (1, rates.shape[-1]):
         return none
     bars, _ = bars_of(campaign, "least_latch_rate")
-    return np.asarray((np.abs(rates - least) < bars[:, None, None]).sum(axis=(1, 2)), dtype=float)
+    slow = (np.abs(rates - least) < bars[:, None, None]) & (least > 0.0)
+    return np.asarray(slow.sum(axis=(1, 2)), dtype=float)
 
 
 _LATCHES = re.compile(rf"whether the latch of ([^;]*?)(?: and (\d+) more)? {UNCERTAIN}")

@@ -238,7 +238,8 @@ def judge(
         require_values(campaign, name)
         off = doubted.get(name, none)
         if name == LATCHED or (name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word):
-            latches = uncertain_latches(campaign) + slow_latches(campaign)
+            # The same latches, mostly.
+            latches = np.maximum(uncertain_latches(campaign), slow_latches(campaign))
             if name == LATCHED:  # so many more or fewer may have caught
                 latches = latches - np.abs(wanted.beyond(numbers(campaign, name)))
             off = off | (latches > 0.0)

@@ -131,8 +131,8 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             factor, unit = readable(variable.units, number)
             number = number if factor == 1.0 else factor * number
             bar = factor * np.asarray(values.get(f"{variable.name}_error", np.nan)).item()
-            text = without_power(f"{number:{variable.summary[1]}}".strip())
-            text = text.rjust(len(f"{number:{variable.summary[1]}}"))
+            text = f"{number:{variable.summary[1]}}"
+            text = without_power(text, number).strip().rjust(len(text))
             text = known_to(text, bar, exact=number).strip().rjust(len(text))
             text = f"{text} {unit_text(unit)}".rstrip()
             if np.isfinite(bar):  # samples of a campaign need not have one

@@ -20,6 +20,7 @@ from ringsim.outputs.family import (
     Variable,
 )
 from ringsim.parts.solver import LEAST_TOLERANCE, NO_DEVIATIONS
+from ringsim.tables import number_text
 
 # What the base carries, and how it turns.
 
@@ -140,14 +141,16 @@ def unresolved(run: Run, shocks: Mapping[str, float]) -> str:
     """
     if run.scene.stop is None or len(run.angles.times) < 2 or not np.isfinite(run.locks).any():
         return ""
-    if not (found := [*_shaken(run, shocks), *_carried(run)]):
-        return ""
-    worst = min(found)
-    return (
-        f"; steps of {1e3 * worst.step:.3g} ms at the lock at {worst.lock:.6g} s are too long for "
-        f"{worst.what}, so {', '.join(each.name for each in found)} may be off: "
-        f"{_to(run, worst.factor)}"
-    )
+    told = ""
+    for found in (list(_shaken(run, shocks)), list(_uncertain_rates(run))):
+        if found:
+            worst, names = min(found), ", ".join(each.name for each in found)
+            length = number_text(1e3 * worst.step, 3)
+            told += (
+                f"; steps of {length} ms at the lock at {worst.lock:.6g} s are too long for "
+                f"{worst.what}, so {names} may be off: {_to(run, worst.factor)}"
+            )
+    return told
 
 
 _SURE, _AIM = 0.05, 0.03
@@ -155,6 +158,8 @@ _SURE, _AIM = 0.05, 0.03
 goes with the tolerance, and so with the square of steps.  On frames of 6 scenes with rods of 17 ms,
 at the default tolerance, a third and a tenth of it, 26 of 28 rates that were off by more than 5 %
 were told, and 54 of the 512 others."""
+_LEAST_FACTOR = 0.15
+"""How much shorter steps shall be at most at once: fifty times the tolerance."""
 _UNKNOWN = 0.2
 """Uncertain share of a rate from which on it may be several times larger: in a slow flight of rods
 of 8 m one of 0.23 was 0.050 rad/s instead of 0.155.  Rates are never so much too large, since
@@ -163,9 +168,9 @@ _JERKED = 0.15
 """Uncertain share where another joint locked in the last two steps: the largest error found."""
 
 
-def _carried(run: Run) -> Iterator[TooLong]:
-    """Of the least and the largest rate at latches: whether the one that it is is uncertain; of the
-    largest also whether another one is so uncertain that it may be larger.
+def _uncertain_rates(run: Run) -> Iterator[TooLong]:
+    """The least and the largest rate at latches, if they are uncertain; the largest also if another
+    one is so uncertain that it may be larger.
     """
     if not run.scene.stop or not run.scene.stop.latch:
         return
@@ -182,10 +187,13 @@ def _carried(run: Run) -> Iterator[TooLong]:
             continue
         last = int(np.clip(np.searchsorted(times, lock), 1, len(times) - 1))
         jerks = (run.locks >= times[max(last - 2, 0)]) & (run.locks < lock - delay)
-        share = max(share, _JERKED) if jerks.any() else share
+        step, what = float(times[last] - times[last - 1]), "the rate at which a latch is met"
+        factor = math.sqrt(_AIM / max(share, _AIM))
+        if jerks.any():  # two steps are to be shorter than the delay; of far longer ones in turns
+            share = max(share, _JERKED)
+            factor = min(math.sqrt(_AIM / share), max(0.5 * delay / step, _LEAST_FACTOR))
         if share > _SURE:
-            step, what = float(times[last] - times[last - 1]), "the rate at which a latch is met"
-            yield TooLong(math.sqrt(_AIM / share), name, what, step, lock)
+            yield TooLong(factor, name, what, step, lock)
 
 
 def _shaken(run: Run, shocks: Mapping[str, float]) -> Iterator[TooLong]:
@@ -210,17 +218,25 @@ def _shaken(run: Run, shocks: Mapping[str, float]) -> Iterator[TooLong]:
             yield TooLong(enough / most, name, what, most, lock)
 
 
-_OFF = re.compile(r"; steps of [^;]* are too long for [^;]*, so ([^;]*) may be off: ([^;]*)")
+_OFF = re.compile(
+    r"; steps of [^;]* are too long for [^;]*, so ([^;]*) may be off: "
+    r"([^;(]*(?:\([^;()]*times the steps\))?)"
+)
+_VALUE = re.compile(r"= ([\d.e+-]+)")
 
 
 def may_be_off(reason: str) -> tuple[list[str], str]:
-    """The numbers that ``unresolved`` has called wrong in a reason, and what cures them.
+    """The numbers that ``unresolved`` has called wrong in a reason, and what cures them all.
 
-    >>> may_be_off("done; steps of 1 s are too long for shocks, so a, b may be off: x")
-    (['a', 'b'], 'x')
+    >>> told = "; steps of 1 s are too long for shocks, so {} may be off: set solver.step = {}"
+    >>> may_be_off("done" + told.format("a, b", 0.02) + told.format("c", 0.01) + " (start 2)")
+    (['a', 'b', 'c'], 'set solver.step = 0.01')
     """
-    found = _OFF.search(reason)
-    return (found[1].split(", "), found[2]) if found else ([], "")
+    found = _OFF.findall(reason)
+    cures = [cure.strip() for _, cure in found]
+    values = [float(value[1]) if (value := _VALUE.search(cure)) else math.inf for cure in cures]
+    names = [name for each, _ in found for name in each.split(", ")]
+    return names, cures[values.index(min(values))] if cures else ""
 
 
 DOUBT = " ?"
@@ -228,18 +244,19 @@ DOUBT = " ?"
 
 
 UNCERTAIN = "catches is uncertain"
-"""What a reason says of a latch that a lock in the same step may have driven or braked."""
-_DOUBTFUL = 2.5
-"""Factor between a rate and the least that a latch asks for, within which a lock may decide."""
+"""What a reason says of a latch of which steps leave uncertain whether it catches."""
+_DOUBTFUL, _SEVERAL = 2.5, 5.0
+"""Factor between a rate and the least that a latch asks for, within which a lock, or a rate whose
+share beyond ``_UNKNOWN`` is uncertain, may decide: of these one was 3.9 times as large."""
 
 
 def jerked(run: Run) -> str:
-    """What a reason says of latches that a lock in the same step may have driven or braked.
+    """What a reason says of latches of which steps leave uncertain whether they catch.
 
-    Rates are those of the step's begin: where the shock of an earlier lock had a quarter of a
-    period to arrive, the joint met its latch with another one: on `truss2` with half of it, on
-    rings of 12 sections with 0.96 to 1.05 of it.  Told are the joints for which such a factor,
-    ``_DOUBTFUL``, decides whether the latch catches.  Empty where no latch asks for a rate.
+    Where the shock of an earlier lock in the same step had a quarter of a period to arrive, the
+    joint met its latch with another rate: on `truss2` with half of it, on rings of 12 sections with
+    0.96 to 1.05 of it.  Where a rate is uncertain by itself, it may be several times larger.  Told
+    are the joints for which such a factor decides.  Empty where no latch asks for a rate.
     """
     latch, locks = run.scene.latch, run.locks
     if latch is None or not np.any(np.asarray(latch.min_rate) > 0.0):
@@ -250,17 +267,19 @@ def jerked(run: Run) -> str:
     )
     met = run.history.rates
     asked = np.broadcast_to(np.asarray(latch.min_rate, dtype=float), locks.shape)
-    near = (met < _DOUBTFUL * asked) & (asked < _DOUBTFUL * met)
-    late = np.argwhere(ahead.any(axis=(-2, -1)) & near).tolist()
+    jolted, unsure = ahead.any(axis=(-2, -1)), np.nan_to_num(run.history.unsure)
+    larger = np.where(unsure > _UNKNOWN, _SEVERAL, 1.0 + 2.0 * unsure * (unsure > _SURE))
+    down = np.where(jolted, _DOUBTFUL, np.minimum(larger, _DOUBTFUL))
+    up = np.where(jolted, np.maximum(larger, _DOUBTFUL), larger)
+    near = (met < down * asked) & (asked < up * met)
+    late = np.argwhere(near).tolist()
     if not late:
         return ""
+    also = "another joint locked in the same step" if jolted[near].any() else "steps are too long"
     planes = run.scene.structure.planes
     names = ", ".join(f"{planes[plane]} {section + 1}" for plane, section in late[:_NAMED])
     more = f" and {len(late) - _NAMED} more" if len(late) > _NAMED else ""
-    return (
-        f"; whether the latch of {names}{more} {UNCERTAIN}, as another joint locked in "
-        f"the same step: reduce {_cure(run)}"
-    )
+    return f"; whether the latch of {names}{more} {UNCERTAIN}, as {also}: reduce {_cure(run)}"
 
 
 def _to(run: Run, factor: float) -> str:

@@ -1,7 +1,7 @@
 """Figures of two campaigns, or runs, beside each other, and of either beside measured data."""
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
@@ -87,10 +87,9 @@ def _figures(
             words = "Distribution of each main number in both"
             yield "values", words, _noted(values(found, both, names), unmoved)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
-    until = _until(both)
-    lines = _lines_of(both)
+    until, lines = _until(both)[0], _lines_of(both)
     drawn = {
-        name: [_course(each, name, until, line) for each, line in zip(both, lines, strict=True)]
+        name: [_course(*each, name) for each in zip(both, until, lines, strict=True)]
         for name in names
     }
     read = {n: rows for n, rows in drawn.items() if all(np.isfinite(r).any() for _, r in rows)}
@@ -209,8 +208,7 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
     ]
     figure = Figure(figsize=(8.2, 2.3 * len(read) + 1.2))
     grid = figure.subplots(len(read), 1, sharex=True, squeeze=False)[:, 0]
-    ends = [_until((each,)) for each in both]
-    apart = max(ends) > _APART * min(ends) > 0.0
+    ends, apart = _until(both)
     for axes, (name, rows_of) in zip(grid, read.items(), strict=True):
         drawn = []
         for each, called, (colour, dashes), end in zip(rows_of, names, _LOOKS, ends, strict=True):
@@ -227,7 +225,7 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         if name != "opening_angle":
             style.span_sizes(axes, np.concatenate([each.ravel() for each in drawn]))
     grid[-1].set_xlabel(style.label(both[0]["time"]))
-    grid[0].set_xlim(0.0, 1.0 if apart else max(ends))
+    grid[0].set_xlim(0.0, 1.0 if apart else ends[0])
     if apart:
         first, second = map("{} s in {}".format, (number_text(e, 3) for e in ends), names_of(found))
         grid[-1].set_xlabel(f"Share of {first} and of {second}")
@@ -242,7 +240,7 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
         cut = [
             f"{called}: {ran_on.partition(': ')[2]}"
             for each, called, end in zip(both, names_of(found), ends, strict=True)
-            if (ran_on := shown_until(each)[1]) and _last(each) > (end if apart else max(ends))
+            if (ran_on := shown_until(each)[1]) and _last(each) > end
         ]  # fmt: skip
         figure.legends[0].set_title("\n".join([*told, _OVER, *cut]))
         figure.legends[0].get_title().set_fontsize(9)
@@ -295,12 +293,14 @@ _APART = 3.0
 shorter one would have less than a third of it."""
 
 
-def _until(several: Sequence[xr.Dataset]) -> float:
-    """Time up to which courses of all are drawn, s."""
-    return max(
+def _until(both: Both) -> tuple[list[float], bool]:
+    """Times up to which the courses of either are drawn, s, and whether each has its own axis."""
+    ends = [
         min(_last(each), shown_until(each)[0]) if "sample" in each.dims else _last(each)
-        for each in several
-    )
+        for each in both
+    ]
+    apart = max(ends) > _APART * min(ends) > 0.0
+    return ends if apart else [max(ends)] * 2, apart
 
 
 def _last(dataset: xr.Dataset) -> float:
@@ -311,7 +311,7 @@ def _last(dataset: xr.Dataset) -> float:
 
 
 def _course(
-    dataset: xr.Dataset, name: str, until: float, line: int | None
+    dataset: xr.Dataset, until: float, line: int | None, name: str
 ) -> tuple[Array, Array]:  # fmt: skip
     """Times and rows of a quantity up to a time (s): of a run itself, of a campaign the least, that
     of the sample whose line is drawn, and the largest.

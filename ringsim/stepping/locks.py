@@ -1,6 +1,7 @@
 """V-joints that reach their stops: when, how latches take them, how steps meet them."""
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -325,13 +326,15 @@ def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
         ends, at = slice(step, step + 2), (plane, section)
         time = crossing(times[ends], past[(ends, *at)], rates[(ends, *at)])
         found.append((step, time, at))
+    steps = [step for step, _, _ in found]
     for step, time, place in found:
         own, speed = past[(slice(None), *place)], rates[(slice(None), *place)]
         if own[step + 1] < ON_STOP:
             yield Meeting(place, time, max(float(speed[step + 1]), 0.0), 0.0)
             continue
         before = time - _TOGETHER * (times[step + 1] - times[step])
-        jerked = any(step - 2 <= k <= step and when < before for k, when, _ in found)
+        lately = found[bisect_left(steps, step - 2) : bisect_right(steps, step)]
+        jerked = any(when < before for _, when, _ in lately)
         yield Meeting(place, time, *_carried(times, own, speed, step, jerked=jerked))
 
 
@@ -352,7 +355,7 @@ def _carried(
     """
     start, left = max(float(rates[step]), 0.0), -float(past[step])
     if step < 2 or (past[step - 2 : step] >= 0.0).any():
-        return start, 0.0
+        return start, 1.0
     speeds, places = rates[step - 2 : step + 1], past[step - 2 : step + 1]
     one, two = np.diff(speeds) / np.diff(times[step - 2 : step + 1])
     steady = one * two > 0.0

@@ -216,8 +216,12 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
         ("sample", np.where(np.arange(30) < 4, 0.25, 0.1), 4),
         (("sample", "section"), np.tile([0.1, 0.1, 0.25, 0.1], (30, 1)), 4),
         (("sample", "section"), np.tile([0.25, 0.25, 0.1, 0.25], (30, 1)), 0),
+        (("sample", "section"), np.tile([0.1, 0.1, 0.0, 0.1], (30, 1)), 0),  # always catches
     ):
         drawn = made.assign(latch_min_rate=(dims, least, says))
+        drawn["latch_peak_torque"] = "sample", np.arange(30.0), says | {"path": "latch.peak_torque"}
+        rates[5:8, 0, 2] = 0.02
+        drawn["latch_rate"] = ("sample", "plane", "section"), rates
         (row,) = verdict_table(analyse(drawn, wanted)).rows
         assert row[1] == (f"met, if its numbers hold: may be off in {count} of 30 samples"
                           if count else "met")  # fmt: skip

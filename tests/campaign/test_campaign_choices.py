@@ -117,7 +117,8 @@ def test_choices_reach_the_runs_and_the_merged_file(bench):
 
 @pytest.mark.quick
 def test_more_joints_than_the_scene_has_cannot_be_required(tmp_path):
-    law = "\n[requirements]\nlatched_joints = { min = %s, probability = 0.9, confidence = 0.9 }\n"
-    load_campaign(written(tmp_path, CHOOSING + law % 4))
-    with pytest.raises(InputError, match=r"latched_joints\.min = 5: must be at most 4, the V-joi"):
-        load_campaign(written(tmp_path, CHOOSING + law % 5))
+    law = "\n[requirements]\n{} = {{ min = {}, probability = 0.9, confidence = 0.9 }}\n"
+    for name in ("latched_joints", "locked_joints"):
+        load_campaign(written(tmp_path, CHOOSING + law.format(name, 4)))
+        with pytest.raises(InputError, match=rf"{name}\.min = 5: must be at most 4, the V-joints"):
+            load_campaign(written(tmp_path, CHOOSING + law.format(name, 5)))

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 import scipy
 
+from ringsim.outputs.base import may_be_off, unresolved
+from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 from ringsim.stepping.instant import Array
-from ringsim.stepping.locks import Meeting, meetings
+from ringsim.stepping.locks import History, Meeting, meetings
 
 
 def meeting(times: list[float], angles: list[float], rates: list[float]) -> Meeting:
@@ -102,6 +104,58 @@ def test_a_run_says_which_rates_the_lock_of_another_joint_may_have_changed() -> 
     # Latches that catch from a fiftieth of these rates on are in no doubt.
     sure = scene.with_values({"solver.tolerance": 1e-3, "latch.min_rate": 1e-3})
     assert "another joint" not in simulate(sure, "frame").attrs["reason"]
+
+
+@pytest.mark.quick
+def test_least_and_largest_rate_are_told_by_their_own_uncertainty_or_a_worse_one() -> None:
+    """Uncertain by 5 %, or jerked within two steps; the largest by any beyond 20 %, too."""
+    times, nothing = np.arange(0.0, 3.0, 0.1), np.zeros((30, 2, 2))
+    scene = load_scene("truss2")
+
+    def named(rates: list[float], unsure: list[float], locks: list[float]) -> list[str]:
+        series = Series(times, nothing, times)
+        own = Run(scene, series, series, np.reshape(locks, (2, 2)), {}, {})
+        own.__dict__["history"] = History(
+            np.reshape(rates, (2, 2)), np.reshape(locks, (2, 2)), np.reshape(unsure, (2, 2))
+        )
+        return may_be_off(unresolved(own, {}))[0]
+
+    rates, calm = [0.1, 0.2, 0.3, 0.4], [0.25, 0.95, 1.65, 2.35]
+    for unsure, told in (
+        ([0.04, 0.04, 0.04, 0.04], []),
+        ([0.06, 0.04, 0.04, 0.04], ["least_latch_rate"]),
+        ([0.04, 0.19, 0.04, 0.06], ["peak_latch_rate"]),
+        ([0.04, 0.19, 0.04, 0.04], []),
+        ([0.04, 0.21, 0.04, 0.04], ["peak_latch_rate"]),
+        ([0.06, 0.04, 0.04, 0.5], ["least_latch_rate", "peak_latch_rate"]),
+    ):
+        assert named(rates, unsure, calm) == told
+    for jerk, told in ((2.348, []), (2.25, ["peak_latch_rate"]), (2.05, [])):
+        assert named(rates, [0.0] * 4, [0.25, 0.95, jerk, 2.35]) == told
+    missing = [0.1, math.nan, 0.3, 0.4]
+    assert named(missing, [0.3, math.nan, 0.0, 0.0], calm) == ["peak_latch_rate"]
+
+
+@pytest.mark.quick
+def test_shocks_and_uncertain_rates_have_a_sentence_each_and_the_smaller_tolerance_cures() -> None:
+    told = "; steps of 1 ms at the lock at 2 s are too long for {}, so {} may be off: set {} = {}"
+    tolerance = "solver.tolerance"
+    value = "3.0e-06 (2 to 3 times the steps)"
+    reason = "done" + told.format("shocks in the rods", "peak_base_force", tolerance, "1.0e-05")
+    reason += told.format("the rate", "least_latch_rate", tolerance, value)
+    names, cure = may_be_off(reason + " (start 2 with solver.step = 0.1 s)")
+    assert names == ["peak_base_force", "least_latch_rate"]
+    assert cure == "set solver.tolerance = 3.0e-06 (2 to 3 times the steps)"
+
+
+def test_a_latch_of_which_an_uncertain_rate_decides_is_told() -> None:
+    """By coarse steps two latches do not catch that catch by finer ones."""
+    values = {"structure.sections": 4, "latch.min_rate": 0.02, "solver.tolerance": 9e-3}
+    run = simulate(load_scene("ring18-flight").with_values(values), "frame")
+    (said,) = re.findall(r"whether the latch of ([^;]*?) catches is uncertain", run.attrs["reason"])
+    wrong = np.argwhere(run.latched.to_numpy() == 0).tolist()
+    assert wrong
+    assert {f"{('upper', 'lower')[p]} {s + 1}" for p, s in wrong} <= set(said.split(", "))
 
 
 def test_rates_that_long_steps_make_wrong_are_told_with_the_tolerance_that_cures_them() -> None:

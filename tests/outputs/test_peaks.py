@@ -160,6 +160,9 @@ def test_the_least_margin_is_told_with_its_angle_and_verdict(margin: float, word
     for plane, more in ((-1.0, less), (margin, ""), (0.3, "")):
         both = least | {"least_drive_margin_time": 0.5, "least_plane_margin": plane}
         assert DriveMargins().told(both, {}) == told + more
+        then = " (0.300 from the start of the last winch on)"
+        later = both | {"least_drive_margin_started": 0.3}
+        assert DriveMargins().told(later, {}) == told + then + more
 
 
 def test_the_summary_of_a_run_tells_both_planes() -> None:
