@@ -103,7 +103,8 @@ def fault_of(
         return f"ended by {signal.Signals(-code).name}"
     if "Traceback (most recent call last)" in told:
         return f"traceback: {lines[-1][:200] if lines else ''}"
-    if warned := re.search(r"^.*\w+Warning: .*$", told, re.MULTILINE):
+    # Looked for before it is matched, which would take minutes in a line of 200 kB.
+    if warned := [each for each in told.splitlines() if "Warning: " in each]:
         return f"a warning of Python: {warned[0][-200:]}"
     if "\x1b[" in told:
         return "commands for the terminal are printed"
