@@ -7,6 +7,7 @@ so do the results.  The slip speed of ropes is given, as its default has a bound
 from __future__ import annotations
 
 import functools
+import re
 
 import numpy as np
 import pytest
@@ -48,7 +49,9 @@ LONGER, ALL = Scale(length=4.0), Scale(length=2.0, time=4.0, mass=16.0)
 def test_a_similar_ring_has_similar_results(name: str, scale: Scale) -> None:
     """To what Newton leaves: a norm of newtons and newton metres moved the peaks by 1e-3 to 0.1."""
     one, other = unscaled(name), run_frame(scaled(ring(name), scale))
-    assert one.reason == other.reason
+    # Lengths of steps and times are other ones; which numbers they leave uncertain is not.
+    reasons = [re.sub(r"steps of .*? are too long for .*?, so", "", r.reason) for r in (one, other)]
+    assert reasons[0] == reasons[1]
     for key in set(COMPARED) & set(one.values):
         factor = scale.of(VARIABLES[key].units)
         np.testing.assert_allclose(

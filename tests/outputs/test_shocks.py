@@ -87,7 +87,8 @@ def test_steps_count_at_locks_alone_and_where_shocks_are_recorded() -> None:
 
     assert "lock at 0.5 s" in unresolved(run(0.05, lock=0.5, reactions=True), shocks(0.5))
     assert unresolved(run(0.05, lock=1.9, reactions=True), shocks(1.9)) == ""
-    assert unresolved(run(0.2), {}) == ""
+    assert unresolved(run(0.2, reactions=True), {}) == ""
+    assert unresolved(run(0.2, stress=True), {"peak_rod_stress": 1.0}) == ""
     assert unresolved(run(0.2, lock=math.nan, reactions=True), AT_ONE) == ""
 
 

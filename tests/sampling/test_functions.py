@@ -14,6 +14,7 @@ from ringsim import InputError
 from ringsim.analysis.design import called, inputs
 from ringsim.campaign.specification import campaign_of
 from ringsim.report import page
+from ringsim.tables import number_text
 
 TABLE = [[200.0, 9e4], [250.0, 1.0e5], [320.0, 1.4e5]]
 INPUTS: dict[str, Any] = {
@@ -68,7 +69,7 @@ def test_they_are_their_tables_of_what_was_drawn(tmp_path: Path) -> None:
     assert [*rows] == ["temperature", "lot", *(path for path in INPUTS if "." in path)]
     assert (rows["temperature"][1], rows["temperature"][-1]) == ("K", "-")
     assert rows["cables.lower.axial_stiffness"][4] == " to ".join(
-        f"{end:.5g}" for end in (lower.min(), lower.max())
+        number_text(end, 5) for end in (lower.min(), lower.max())
     )
     plan = given.plan(out=tmp_path / "p")
     assert "cables.lower.axial_stiffness: " in plan
