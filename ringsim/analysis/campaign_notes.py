@@ -43,7 +43,7 @@ from ringsim.analysis.intervals import (
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
-from ringsim.outputs.base import DOUBT, UNCERTAIN, may_be_off
+from ringsim.outputs.base import DOUBT, UNCERTAIN, may_be_off, without_doubts
 from ringsim.outputs.family import Array
 from ringsim.overrides import flat
 from ringsim.sampling.distributions import labels_of
@@ -95,7 +95,7 @@ def ending_lines(
     run = int(np.sum(words != NOT_RUN))
     for word in kinds_of_ends(words):
         own = np.flatnonzero(words == word)
-        why = "" if word in (*REACHED, UNKNOWN) else reason_of(int(own[0]))
+        why = "" if word in (*REACHED, UNKNOWN) else without_doubts(reason_of(int(own[0])))
         if word.startswith(LOST):
             told = f", first sample {own[0]}"
         else:

@@ -241,6 +241,15 @@ def may_be_off(reason: str) -> tuple[list[str], str]:
     return names, cures[values.index(min(values))] if cures else ""
 
 
+def without_doubts(reason: str) -> str:
+    """A reason without what ``unresolved`` has added, which differs between runs that ended alike.
+
+    >>> without_doubts("done; steps of 1 s are too long for shocks, so a may be off: set b = 1; c")
+    'done; c'
+    """
+    return _OFF.sub("", reason)
+
+
 DOUBT = " ?"
 """Stands behind what may be off, wherever it is told."""
 

@@ -34,6 +34,7 @@ from ringsim.analysis.study_text import Section, head_lines, outputs_in, section
 from ringsim.analysis.worst import first_clause, note_on_unusual, worst_tables
 from ringsim.files import write_text
 from ringsim.measured import Measurement
+from ringsim.outputs.base import without_doubts
 from ringsim.overrides import flat
 from ringsim.plots import style
 from ringsim.plots.comparison import figures_of_both, measured_and_computed
@@ -77,7 +78,8 @@ def failures(
     told = {} if told is None else told
     words, goals = endings(campaign), (*REACHED, UNKNOWN, NOT_RUN)
     causes = {int(cause): cause.words for cause in Cause if cause}
-    codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
+    codes = campaign["cause"].values.tolist()
+    reasons = [without_doubts(str(each)) for each in campaign["reason"].values.tolist()]
     alike: dict[tuple[str, str, str], list[int]] = {}
     first: dict[tuple[str, str, str], str] = {}
     said: dict[tuple[str, str, str], set[str]] = {}
