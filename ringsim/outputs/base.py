@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsim.layout.layout import layout_of
 from ringsim.outputs.family import (
@@ -20,6 +21,8 @@ from ringsim.outputs.family import (
     Variable,
 )
 from ringsim.parts.solver import LEAST_TOLERANCE, NO_DEVIATIONS
+from ringsim.scene import Scene
+from ringsim.stepping.locks import History
 from ringsim.tables import number_text
 
 # What the base carries, and how it turns.
@@ -153,11 +156,11 @@ def unresolved(run: Run, shocks: Mapping[str, float]) -> str:
     return told
 
 
-_SURE, _AIM = 0.05, 0.03
+SURE, _AIM = 0.05, 0.03
 """Uncertain share of a latch's rate from which on it is told, and the one that its cure aims at: it
 goes with the tolerance, and so with the square of steps.  On frames of 6 scenes with rods of 17 ms,
-at the default tolerance, a third and a tenth of it, 26 of 28 rates that were off by more than 5 %
-were told, and 54 of the 512 others."""
+at the default tolerance, a third and a tenth of it, 25 of 27 rates that were off by more than 5 %
+were told, and 55 of the 513 others (benchmarks/latch_rates.py)."""
 _LEAST_FACTOR = 0.15
 """How much shorter steps shall be at most at once: fifty times the tolerance."""
 _UNKNOWN = 0.2
@@ -174,8 +177,9 @@ def _uncertain_rates(run: Run) -> Iterator[TooLong]:
     """
     if not run.scene.stop or not run.scene.stop.latch:
         return
-    rates, unsure, times = run.history.rates, run.history.unsure, run.angles.times
-    delay = 0.25 * slowest_period(run)  # until a jerk has come through a rod
+    rates, times, period = run.history.rates, run.angles.times, slowest_period(run.scene)
+    jerked = jolted(times, run.locks, period)
+    unsure = uncertain(run.history, jerked)
     for name, sizes in (("least_latch_rate", -rates), ("peak_latch_rate", rates)):
         if not np.isfinite(sizes).any() or (name.startswith("least") and np.isnan(sizes).any()):
             continue
@@ -186,14 +190,32 @@ def _uncertain_rates(run: Run) -> Iterator[TooLong]:
         if not np.isfinite(lock):
             continue
         last = int(np.clip(np.searchsorted(times, lock), 1, len(times) - 1))
-        jerks = (run.locks >= times[max(last - 2, 0)]) & (run.locks < lock - delay)
         step, what = float(times[last] - times[last - 1]), "the rate at which a latch is met"
         factor = math.sqrt(_AIM / max(share, _AIM))
-        if jerks.any():  # two steps are to be shorter than the delay; of far longer ones in turns
-            share = max(share, _JERKED)
-            factor = min(math.sqrt(_AIM / share), max(0.5 * delay / step, _LEAST_FACTOR))
-        if share > _SURE:
+        if jerked.flat[place]:  # two steps are to be shorter than the delay; in turns if far longer
+            factor = min(factor, max(0.5 * _DELAY * period / step, _LEAST_FACTOR))
+        if share > SURE:
             yield TooLong(factor, name, what, step, lock)
+
+
+_DELAY = 0.25
+"""Time until a jerk has come through a rod over its period."""
+
+
+def jolted(times: Array, locks: Array, period: float) -> NDArray[np.bool_]:
+    """Which V-joints another one may have jerked that locked within two steps before; ``times`` of
+    steps (s), ``locks`` of shape (planes, sections) (s), and the slowest rod's ``period`` (s).
+    """
+    last = np.clip(np.searchsorted(times, locks), 1, len(times) - 1)
+    begin, end = times[np.maximum(last - 2, 0)], locks - _DELAY * period
+    own = locks[..., None, None]
+    return np.asarray(((locks >= begin[..., None, None]) & (locks < end[..., None, None])
+                       & np.isfinite(own)).any(axis=(-2, -1)))  # fmt: skip
+
+
+def uncertain(found: History, jerked: NDArray[np.bool_]) -> Array:
+    """Share of each latch's rate that steps leave uncertain, shape (planes, sections)."""
+    return np.asarray(np.where(jerked, np.fmax(found.unsure, _JERKED), found.unsure))
 
 
 def _shaken(run: Run, shocks: Mapping[str, float]) -> Iterator[TooLong]:
@@ -205,7 +227,7 @@ def _shaken(run: Run, shocks: Mapping[str, float]) -> Iterator[TooLong]:
     if not shocks or not (record.reactions or record.accelerations):
         return
     locks = run.locks[np.isfinite(run.locks)]
-    times, period = run.angles.times, slowest_period(run)
+    times, period = run.angles.times, slowest_period(run.scene)
     first = np.clip(np.searchsorted(times, locks) - 1, 0, len(times) - 2)
     last = np.maximum(np.searchsorted(times, locks + 0.25 * period), first + 1)
     longest = [float(np.diff(times[i : k + 1]).max()) for i, k in zip(first, last, strict=True)]
@@ -274,19 +296,19 @@ def jerked(run: Run) -> str:
         return ""
     first = np.searchsorted(run.angles.times, locks) - 1
     ahead = (first[..., None, None] == first) & (
-        locks[..., None, None] - locks > 0.25 * slowest_period(run)
+        locks[..., None, None] - locks > _DELAY * slowest_period(run.scene)
     )
     met = run.history.rates
     asked = np.broadcast_to(np.asarray(latch.min_rate, dtype=float), locks.shape)
-    jolted, unsure = ahead.any(axis=(-2, -1)), np.nan_to_num(run.history.unsure)
-    larger = np.where(unsure > _UNKNOWN, _SEVERAL, 1.0 + 2.0 * unsure * (unsure > _SURE))
-    down = np.where(jolted, _DOUBTFUL, np.minimum(larger, _DOUBTFUL))
-    up = np.where(jolted, np.maximum(larger, _DOUBTFUL), larger)
+    driven, unsure = ahead.any(axis=(-2, -1)), np.nan_to_num(run.history.unsure)
+    larger = np.where(unsure > _UNKNOWN, _SEVERAL, 1.0 + 2.0 * unsure * (unsure > SURE))
+    down = np.where(driven, _DOUBTFUL, np.minimum(larger, _DOUBTFUL))
+    up = np.where(driven, np.maximum(larger, _DOUBTFUL), larger)
     near = (met < down * asked) & (asked < up * met)
     late = np.argwhere(near).tolist()
     if not late:
         return ""
-    also = "another joint locked in the same step" if jolted[near].any() else "steps are too long"
+    also = "another joint locked in the same step" if driven[near].any() else "steps are too long"
     planes = run.scene.structure.planes
     names = ", ".join(f"{planes[plane]} {section + 1}" for plane, section in late[:_NAMED])
     more = f" and {len(late) - _NAMED} more" if len(late) > _NAMED else ""
@@ -317,7 +339,7 @@ def _cure(run: Run) -> str:
     return "solver.step" if constant else "solver.tolerance"
 
 
-def slowest_period(run: Run) -> float:
+def slowest_period(scene: Scene) -> float:
     """Longest of the rods' lowest periods of bending, with pinned ends, s.
 
     2 pi / w, w = (pi / L)^2 sqrt(E I / (rho A)): S. Timoshenko, Vibration Problems in Engineering.
@@ -325,5 +347,5 @@ def slowest_period(run: Run) -> float:
     return max(
         2.0 * rod.length**2 / math.pi
         * math.sqrt(rod.density * rod.tube.area / (rod.young_modulus * rod.tube.second_moment))
-        for rod in layout_of(run.scene).rods
+        for rod in layout_of(scene).rods
     )  # fmt: skip
