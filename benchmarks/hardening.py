@@ -12,6 +12,7 @@ page.  What only root may do is skipped for others, and says so.
 from __future__ import annotations
 
 import argparse
+import signal
 import subprocess
 import sys
 import tempfile
@@ -60,6 +61,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2, help="drills at once")
     parser.add_argument("--out", type=Path, help="page to write")
     given = parser.parse_args()
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup has it ignored, also in what is drilled
     groups = ("kills", "faults", "files", "fuzz")
     DRILLS.sort(key=lambda each: groups.index(each.group))
     if given.cases:

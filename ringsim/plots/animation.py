@@ -74,6 +74,7 @@ def animate(run: xr.Dataset, path: Path, colour: str = "lag") -> Path:
         shape = shape_of(run, scene_from_toml(str(run.attrs["scene"]), source="attribute scene"))
     except ValueError as error:
         raise InputError(f"{path}: {error}: there is nothing to draw") from error
+    run = style.legible(run)
     paint = by_stress(run, shape) if colour == "stress" else by_lag(run, shape)
     frames = _frames(run, shape, paint)
     lasts = [1000 // RATE] * (len(frames) - 1) + [int(1000 * HELD)]

@@ -64,6 +64,7 @@ def figures_of_both(
     found: xr.Dataset, first: xr.Dataset, second: xr.Dataset
 ) -> Iterator[tuple[str, str, Figure]]:
     """Name, what it shows in words, and figure, of what ``compare`` has found of two datasets."""
+    found, first, second = map(style.legible, (found, first, second))
     for name, words, figure in _figures(found, first, second):
         style.in_readable_units(figure)
         mark_panels(figure, doubtful(found))

@@ -35,7 +35,7 @@ def figures_of(dataset: xr.Dataset, name: str | None = None) -> Iterator[tuple[P
     """Every figure for which a run, or the samples of a merged campaign, recorded something; or the
     one of that name.
     """
-    dataset, read = legible(dataset), dict[object, object]()
+    dataset, read = style.legible(dataset), dict[object, object]()
     for each in PICTURES:
         if name not in (None, each.name):
             continue
@@ -47,31 +47,6 @@ def figures_of(dataset: xr.Dataset, name: str | None = None) -> Iterator[tuple[P
         figure = each.draw(dataset, *shared)
         style.in_readable_units(figure)
         yield each, figure
-
-
-def legible(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with attributes that can be drawn, whoever wrote its file: no formulas in the
-    words of axes, which matplotlib may not understand, no control characters, no endless texts.
-    """
-    texts = {key: dataset.attrs[key] for key in _TEXTS & dataset.attrs.keys()}
-    found = dataset.assign_attrs({key: _drawn(text, 2000) for key, text in texts.items()})
-    for variable in found.variables.values():
-        for key in variable.attrs.keys() & {"long_name", "units"}:
-            words = _drawn(variable.attrs[key])
-            variable.attrs[key] = style.plain(words) if isinstance(words, str) else words
-    return found
-
-
-_TEXTS = {"title", "name", "reason"}
-_LONGEST_WORDS = 200
-"""Letters; axes of longer words would leave no room for curves."""
-
-
-def _drawn(words: Any, most: int = _LONGEST_WORDS) -> Any:
-    if not isinstance(words, str) or (words.isprintable() and len(words) <= most):
-        return words
-    kept = "".join(each if each.isprintable() or each == "\n" else " " for each in words[:most])
-    return kept if len(words) <= most else f"{kept} ..."
 
 
 def _recorded(dataset: xr.Dataset, each: Picture) -> bool:

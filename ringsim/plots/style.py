@@ -175,6 +175,36 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
+def legible(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with attributes that can be drawn, whoever wrote its file: no formulas in names
+    and in the words of axes, which matplotlib may not understand, no control characters, no endless
+    texts.
+    """
+    texts = {key: dataset.attrs[key] for key in _TEXTS & dataset.attrs.keys()}
+    found = dataset.assign_attrs({key: _drawn(text, _LONGEST_TITLE) for key, text in texts.items()})
+    names = {key: _drawn(found.attrs[key]) for key in _NAMES & found.attrs.keys()}
+    found = found.assign_attrs({key: plain(str(name)) for key, name in names.items()})
+    for variable in found.variables.values():
+        for key in variable.attrs.keys() & {"long_name", "units"}:
+            words = _drawn(variable.attrs[key])
+            variable.attrs[key] = plain(words) if isinstance(words, str) else words
+    return found
+
+
+_TEXTS = {"title", "name", "reason"}
+_NAMES = {"first_name", "second_name"}
+"""Attributes with what a comparison calls its two, in legends and axes."""
+_LONGEST_WORDS, _LONGEST_TITLE = 200, 400
+"""Letters of the words of axes and of titles; longer ones would leave no room for curves."""
+
+
+def _drawn(words: Any, most: int = _LONGEST_WORDS) -> Any:
+    if not isinstance(words, str) or (words.isprintable() and len(words) <= most):
+        return words
+    kept = "".join(each if each.isprintable() or each == "\n" else " " for each in words[:most])
+    return kept if len(words) <= most else f"{kept} ..."
+
+
 FIXED = "\u00a0"
 """A blank at which no line is broken."""
 

@@ -452,7 +452,7 @@ def test_a_figure_is_one_entry(deployed: xr.Dataset, monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("told", [r"$\frac{$", "\x1b[31mred", "x" * 200_000])
 def test_words_of_a_file_are_drawn_whatever_they_are(deployed: xr.Dataset, told: str) -> None:
     """No formula that matplotlib refuses, no letter without a sign, no end of layout."""
-    dataset = deployed.copy(deep=True).assign_attrs(reason=told)
+    dataset = deployed.copy(deep=True).assign_attrs(reason=told, title=told)
     for name in ("opening_angle", "section"):
         dataset[name].attrs |= {"long_name": told, "units": told}
     [(_, figure)] = figures_of(dataset, "opening_angles")

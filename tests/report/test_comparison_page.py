@@ -204,6 +204,16 @@ def test_a_sample_that_runs_on_ends_no_axis_of_a_comparison() -> None:
     assert told.endswith("\nground: 1 sample goes on, until 10 s.")
 
 
+@pytest.mark.parametrize("told", [r"$\frac{$", "\x1b[31mred", "x" * 200_000])
+def test_texts_of_the_files_are_drawn_whatever_they_are(told: str) -> None:
+    one = made_campaign(8).assign_attrs(title=told, campaign_name=told)
+    for array in (one["peak_tension"], one["opening_angle"]):
+        array.attrs |= {"long_name": told, "units": told}
+    found = compare(one, made_campaign(8), (told, "other"))
+    for _, _, figure in figures_of_both(found, one, made_campaign(8)):
+        figure.draw_without_rendering()
+
+
 @pytest.mark.parametrize("slower", [2.0, 10.0])
 def test_a_slow_flight_and_a_fast_test_have_an_axis_each(
     slower: float, monkeypatch: pytest.MonkeyPatch
