@@ -359,6 +359,7 @@ def _found(campaign: xr.Dataset, name: str, place: int) -> str:
         units = quantities()[name].units
         return with_unit(f"{value:.4g}", units)
     why = first_clause(str(campaign["reason"].to_numpy()[place])) if "reason" in campaign else ""
+    why = why or "no reason is told"
     return f"no value: {why}" if name else why
 
 

@@ -186,7 +186,7 @@ def legible(dataset: xr.Dataset) -> xr.Dataset:
     found = found.assign_attrs({key: plain(str(name)) for key, name in names.items()})
     for variable in found.variables.values():
         for key in variable.attrs.keys() & {"long_name", "units"}:
-            words = _drawn(variable.attrs[key])
+            words = _drawn(variable.attrs[key], _LONGEST_UNIT if key == "units" else _LONGEST_WORDS)
             variable.attrs[key] = plain(words) if isinstance(words, str) else words
     return found
 
@@ -194,12 +194,16 @@ def legible(dataset: xr.Dataset) -> xr.Dataset:
 _TEXTS = {"title", "name", "reason"}
 _NAMES = {"first_name", "second_name"}
 """Attributes with what a comparison calls its two, in legends and axes."""
-_LONGEST_WORDS, _LONGEST_TITLE = 200, 400
-"""Letters of the words of axes and of titles; longer ones would leave no room for curves."""
+_LONGEST_WORDS, _LONGEST_UNIT, _LONGEST_TITLE = 200, 24, 400
+"""Letters of the words and units of axes and of titles; longer ones would leave no room for curves.
+"""
 
 
 def _drawn(words: Any, most: int = _LONGEST_WORDS) -> Any:
-    if not isinstance(words, str) or (words.isprintable() and len(words) <= most):
+    if not isinstance(words, str):
+        return words
+    words = re.sub(r"\S{48,}", lambda word: f"{word[0][:45]}...", words)  # no line could hold it
+    if words.isprintable() and len(words) <= most:
         return words
     kept = "".join(each if each.isprintable() or each == "\n" else " " for each in words[:most])
     return kept if len(words) <= most else f"{kept} ..."
