@@ -117,7 +117,7 @@ def _kept(both: Both, held: tuple[Mask, Mask]) -> dict[str, Event]:
             continue
         try:
             for each in both:
-                require_values(each, name)
+                require_values(each, name, wanted)
         except InputError:  # the file of one does not tell it
             continue
         first, second = (good(each) & ~violations(each, name, wanted) for each in both)

@@ -220,6 +220,20 @@ def _value(word: str) -> Any:
         return word.strip("\"'")
 
 
+COUNTS = ("locked_joints", "latched_joints")
+"""Outputs that count the V-joints of an antenna."""
+
+
+def beyond_joints(name: str, wanted: Requirement, joints: int) -> str:
+    """What is wrong with a requirement that asks for more V-joints than there are; or empty."""
+    if name not in COUNTS or wanted.min is None or wanted.min <= joints:
+        return ""
+    return (
+        f"{name}.min = {wanted.min:g}: must be at most {joints}, the V-joints of this scene: no "
+        "sample could keep to it"
+    )
+
+
 def violations(campaign: xr.Dataset, name: str, wanted: Requirement) -> Mask:
     """Which samples violate a requirement, of those that have numbers that hold.
 
@@ -228,8 +242,10 @@ def violations(campaign: xr.Dataset, name: str, wanted: Requirement) -> Mask:
     return np.asarray(good(campaign) & ~(wanted.beyond(numbers(campaign, name)) <= 0.0))
 
 
-def require_values(campaign: xr.Dataset, name: str) -> None:
-    """Refuse (InputError) an output that the runs do not compute: it would seem violated."""
+def require_values(campaign: xr.Dataset, name: str, wanted: Requirement) -> None:
+    """Refuse (InputError) an output that the runs do not compute, and more V-joints than they have:
+    the requirement would seem violated.
+    """
     if name not in campaign:
         known = [OUTCOME, *(each for each in quantities() if each in campaign)]
         raise InputError(
@@ -242,3 +258,6 @@ def require_values(campaign: xr.Dataset, name: str) -> None:
             f"value of it, first sample {campaign['sample'].to_numpy()[none[0]]}: this fidelity "
             'does not compute it; set the requirement on another output, or use fidelity = "full"'
         )
+    joints = campaign.sizes.get("plane", 0) * campaign.sizes.get("section", 0)
+    if joints and (wrong := beyond_joints(name, wanted, joints)):
+        raise InputError(f"requirement on {wrong}")

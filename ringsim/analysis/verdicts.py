@@ -235,7 +235,7 @@ def judge(
     none = np.zeros(campaign.sizes["sample"], dtype=bool)
     doubted = doubtful(campaign)[0] if requirements else {}
     for name, wanted in requirements.items():
-        require_values(campaign, name)
+        require_values(campaign, name, wanted)
         off = doubted.get(name, none)
         if name == LATCHED or (name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word):
             # The same latches, mostly.

@@ -243,8 +243,8 @@ def worst(
     came, the shortest first.  ``analysis`` is the ``influence`` of the campaign, whose inputs that
     separate a failure are named first.  InputError if a requirement cannot be judged.
     """
-    for name in requirements:
-        require_values(campaign, name)
+    for name, wanted in requirements.items():
+        require_values(campaign, name, wanted)
     # What has not run yet is no sample of which others are told.
     campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
     rows, chosen = list[tuple[str, int, int, str]](), list[int]()

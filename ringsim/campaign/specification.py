@@ -15,7 +15,7 @@ from ringsim import extensions
 from ringsim.analysis import derived
 from ringsim.analysis.intervals import quantities, samples_needed
 from ringsim.analysis.optimum import Objective
-from ringsim.analysis.requirements import Requirements
+from ringsim.analysis.requirements import Requirements, beyond_joints
 from ringsim.analysis.verdicts import Condition, Looks, Rule, as_list
 from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
@@ -476,11 +476,7 @@ def campaign_of(
                 f"scene has no {absent[0]}: leave it out, or {supply(absent[0])}"
             )
     joints = len(varied.structure.planes) * varied.structure.sections
-    for name in ("locked_joints", "latched_joints"):
-        wanted_of = specification.requirements.get(name)
-        if wanted_of is not None and wanted_of.min is not None and wanted_of.min > joints:
-            raise InputError(
-                f"{path.name}: requirements.{name}.min = {wanted_of.min:g}: must be at most "
-                f"{joints}, the V-joints of this scene: no sample could keep to it"
-            )
+    for name, each in specification.requirements.items():
+        if wrong := beyond_joints(name, each, joints):
+            raise InputError(f"{path.name}: requirements.{wrong}")
     return Campaign(path, text, specification, varied)

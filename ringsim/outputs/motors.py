@@ -290,6 +290,12 @@ class DriveMargins(Output):
             "smallest static margin of either plane's own cable, against half of all that resists",
             worse="smaller", least_of="least_drive_margin_plane",
         ),
+        Variable(
+            "least_plane_margin_started", (), "1",
+            "smallest static margin of either plane's own cable from the start of the last winch "
+            "on; of runs that ended before, that of the whole run",
+            needs=SEVERAL, worse="smaller",
+        ),
     )  # fmt: skip
 
     def told(self, values: Values, span_names: SpanNames) -> str:

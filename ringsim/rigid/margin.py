@@ -349,6 +349,10 @@ def with_margin(
     if np.isfinite(by_plane).any():
         values["least_drive_margin_plane"] = by_plane
         values["least_plane_margin"] = np.asarray(by_plane.min())
+        if len(last.conditions.winches) > 1:
+            later = _by_plane(outcome, drives, last.conditions.started)
+            later = later if np.isfinite(later).any() else by_plane
+            values["least_plane_margin_started"] = np.asarray(np.fmin.reduce(later))
     return replace(
         outcome,
         reason=reason,
@@ -365,9 +369,12 @@ def _drive(scene: Scene, standard: MarginStandard) -> DriveMargin | None:
         return None
 
 
-def _by_plane(outcome: Outcome, drives: Sequence[tuple[float, DriveMargin | None]]) -> Array:
-    """The least margin of each plane at the mean angles of its own V-joints, until it has locked,
-    shape (planes,), of drives each until a time (s); NaN unless there are cables in two planes.
+def _by_plane(
+    outcome: Outcome, drives: Sequence[tuple[float, DriveMargin | None]], since: float = -math.inf
+) -> Array:
+    """The least margin of each plane at the mean angles of its own V-joints, from ``since`` (s)
+    until it has locked, shape (planes,), of drives each until a time (s); NaN unless there are
+    are cables in two planes, and of a plane that had locked before.
     """
     opening = outcome.values["opening_angle"]
     locks = outcome.values.get("lock_time", np.full(opening.shape[:2], math.nan)).max(axis=1)
@@ -376,10 +383,11 @@ def _by_plane(outcome: Outcome, drives: Sequence[tuple[float, DriveMargin | None
         way = passed(outcome.coordinates["time"], opening[[plane]], lock)
         begin = -math.inf
         for until, drive in drives:
-            inside = len(way.times) and begin <= way.times[-1] and until > way.times[0]
+            on = max(begin, since)
+            inside = len(way.times) and on <= way.times[-1] and until > max(way.times[0], since)
             two = drive is not None and len(drive.drive.cables) == 2
-            if drive is not None and two and inside and begin < drive.conditions.end:
-                least = least_along(PlaneMargin(drive, plane), way.between(begin, until))
+            if drive is not None and two and inside and on < drive.conditions.end:
+                least = least_along(PlaneMargin(drive, plane), way.between(on, until))
                 found[plane] = np.fmin(found[plane], least.margin)
             begin = until
     return found

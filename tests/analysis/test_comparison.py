@@ -81,6 +81,9 @@ def test_differences_within_the_numerical_errors_are_named():
     )
     said += "asynchrony_max (0.42"
     assert [any(x.startswith(said) for x in lines) for lines in told] == [True, False]
+    # What the bars of both may have made is worse in neither; beyond one bar alone it is.
+    rows = [next(x for x in lines if x.startswith("asynchrony_max ")) for lines in told]
+    assert ["  second  " in f"{row}  " for row in rows] == [False, True], rows
     # Alike outputs have no row, and their bars are measured all the same.
     same = compared(compare(both[0], both[0]))
     assert not any("numerical errors are not measured" in line for line in same)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from loops import for_each
+from made_campaign import made_campaign
 
 from ringsim.analysis import requirements
 from ringsim.analysis.requirements import Kind, parse_requirements, read_requirements
@@ -23,6 +24,17 @@ def test_both_ways_of_writing_read_alike():
         "asynchrony_max=max=10, probability = 0.99, confidence=0.9",
     ]
     assert parse_requirements(texts) == read_requirements(table, "file")
+
+
+def test_more_joints_than_a_campaign_has_cannot_be_required():
+    made = made_campaign()
+    for name in requirements.COUNTS:
+        made[name] = "sample", np.full(8, 8)
+        (of_all,) = parse_requirements([f"{name}: min 8, probability 0.9, confidence 0.9"]).values()
+        requirements.require_values(made, name, of_all)
+        more = of_all.model_copy(update={"min": 9.0})
+        with pytest.raises(InputError, match=rf"on {name}\.min = 9: must be at most 8, the V-jo"):
+            requirements.require_values(made, name, more)
 
 
 @for_each(

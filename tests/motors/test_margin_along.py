@@ -299,6 +299,15 @@ def test_each_plane_has_the_margin_of_its_own_cable_along_its_own_angles() -> No
     assert found["least_plane_margin"] == pytest.approx(-1.0)
     alone = virtual_work(ONE, math.radians(90.0))
     assert found["least_drive_margin"] == pytest.approx(alone, rel=1e-6)
+    # A winch that starts at 0.5 s leaves its plane without drive until then, and with it from then.
+    late = plain | {"cables__lower__winch__start_time": 0.5}
+    waiting = with_margin(opened(0.05), ring(**late)).values
+    assert waiting["least_plane_margin"] == pytest.approx(-1.0)
+    best = min(virtual_work(BOTH, math.radians(angle)) for angle in np.linspace(90.0, 179.9, 8))
+    assert waiting["least_plane_margin_started"] == pytest.approx(best, rel=2e-2)
+    short = opened(0.05, lock=math.nan)
+    short.values["opening_angle"][:, :, 8:] = np.nan
+    assert with_margin(short, ring(**late)).values["least_plane_margin_started"] == -1.0
     single = with_margin(opened(0.05), ring(**plain, cables__lower="none")).values
     assert "least_plane_margin" not in single
 

@@ -97,6 +97,14 @@ def test_the_files_hold_labels_and_give_the_same_scenes_back(tmp_path: Path) -> 
     assert units["faults"] is units["cables_lower_winch_winding"] is None
 
 
+def test_a_design_of_a_fidelity_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    write_design(tmp_path, drawn({"faults": FAULTS}), IDENTITY | {"fidelity": "frame"})
+    assert read_design(tmp_path)[1]["fidelity"] == "frame"
+    write_design(tmp_path, drawn({"faults": FAULTS}), IDENTITY | {"fidelity": "banana"})
+    with pytest.raises(InputError, match=r'design\.nc: its fidelity is "banana": the file is dam'):
+        read_design(tmp_path)
+
+
 def test_a_grid_crosses_tables_and_faults() -> None:
     table = drawn(
         {"faults": FAULTS, "cables.lower.winch.winding": WINDING}, design={"kind": "grid"}
