@@ -144,7 +144,8 @@ class ChainState:
         moves, seen, friction = self.friction.moves, self.pulleys, self.friction
         share = (1.0 - np.cumsum(part)[:-1] - float(end)) / slip
         slid = self.speeds[inner] / slip - present * share
-        alive, logs = float(ropes.alive[rope]), np.zeros(len(part))
+        alive, logs, place = float(ropes.alive[rope]), np.zeros(len(part)), -1 if end else 0
+        behind = logs[1:]
 
         def ratio(speed: float) -> float:
             # A root finder asks some ten thousand times a run: few calls of numpy, in place.
@@ -152,9 +153,9 @@ class ChainState:
             if moves:
                 seen.speed[inner] = np.abs(turning) * slip
                 own = friction.decays(seen)[inner]
-            np.cumsum(own * np.tanh(turning), out=logs[1:])
+            np.add.accumulate(own * np.tanh(turning), out=behind)
             weights = np.exp(logs - np.maximum.reduce(logs))
-            return alive * float(weights[-1 if end else 0]) / float(weights @ part)
+            return alive * float(weights[place]) / float(weights @ part)
 
         path_rate = float(self.path_rates[rope] + self.wound_rates[rope]) - present
         return WinchReading(tension_ratio=ratio, path_rate=path_rate, path_slope=path_slope)

@@ -10,7 +10,7 @@ import numpy as np
 from ringsim.cable.chain import ChainState
 from ringsim.cable.records import Cable, Cables, Winch
 from ringsim.cable.ropes import Array, Ropes
-from ringsim.cable.winding import FeedbackWinding, WinchReading
+from ringsim.cable.winding import FeedbackWinding, PrescribedWinding, WinchReading
 from ringsim.choice import kind_of
 from ringsim.parts.faults import AT_ONCE
 
@@ -69,9 +69,9 @@ class _Rope:
     """Path (m), and natural length outside of the drums (m)."""
     material: list[float]
     """EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N)."""
-    members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading, float]]
-    """Laws, readings and how fast ``path_slope`` changes (m/rad/s) by cable and end (0 first, 1
-    far)."""
+    members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading, float, float, float]]
+    """Laws, readings, how fast ``path_slope`` changes (m/rad/s), and the laws' least and largest
+    speeds (m/s), by cable and end (0 first, 1 far)."""
     speeds_at: dict[tuple[int, int], tuple[float, float]]
     """Speeds of the members at the beginnings of this step and of the one before, m/s."""
     total: float
@@ -146,14 +146,14 @@ class _Rope:
         """The answer, by a search from the last one."""
         count, (stiffness, damping_time, width) = len(self.members), self.material
         follow = -self.takeup(elapsed, path, natural, -rate - rest)
-        laws = []
-        for place, (law, reading, bend) in self.members.items():
-            lagging, lag = self.lagging(place, elapsed)
-            seen = replace(
-                reading, path_rate=follow / count, path_slope=reading.path_slope + elapsed * bend,
-                time=reading.time + elapsed, lagging=lagging, lag=lag,
-            )  # fmt: skip
-            laws.append((law, seen, law.limits()))
+        laws, low, high = [], 0.0, 0.0
+        for place, (law, begun, bend, least, most) in self.members.items():
+            slope, time = begun.path_slope + elapsed * bend, begun.time + elapsed
+            seen = WinchReading(
+                begun.tension_ratio, follow / count, slope, time, *self.lagging(place, elapsed)
+            )
+            laws.append((law, seen, least, most))
+            low, high = low + least, high + most
 
         def commands(total: float) -> list[float]:
             left = natural - self.wound(elapsed, total)
@@ -164,10 +164,9 @@ class _Rope:
             mean = max(force, 0.0) + width * math.log1p(math.exp(-abs(force) / width))
             return [
                 min(max(law.command(mean * now.tension_ratio(total / count), now), least), most)
-                for law, now, (least, most) in laws
+                for law, now, least, most in laws
             ]
 
-        low, high = (sum(bounds) for bounds in zip(*(limits for *_, limits in laws), strict=True))
         total, self.gain = root_of_rising(
             lambda v: v - sum(commands(v)), min(max(self.total, low), high), self.gain, low, high
         )
@@ -284,19 +283,19 @@ class Winches:
         inside = max(time - AT_ONCE, 0.5 * (begin + time))
         moment = inside if time > begin else time + AT_ONCE
         for place, winch in self._winches.items():
-            held = float(self._held[place])
-            wound[place], speed[place] = winch.at(time, held, moment=moment)
+            if isinstance(winch.winding, PrescribedWinding):
+                wound[place], speed[place] = winch.at(time, moment=moment)
         for place, more in self._ahead.items():
             wound[place] += more
         return wound, speed
 
     def _asked(
         self, time: float, ropes: Ropes, paths: Array, rates: Array, wound: Array, speed: Array
-    ) -> tuple[float, list[list[float]]]:
+    ) -> tuple[float, list[tuple[float, ...]]]:
         """What ``_Rope.speeds`` asks: the time since the step began, and the rest of each rope."""
         natural = ropes.content - ropes.per_rope(wound)
-        asked = np.stack([paths, rates, natural, ropes.per_rope(speed)], axis=-1)
-        return time - self._start, asked.tolist()
+        asked = (paths, rates, natural, ropes.per_rope(speed))
+        return time - self._start, [*zip(*(each.tolist() for each in asked), strict=True)]
 
     def memory(self) -> dict[str, Any]:
         """Every winch as it is by now: cable, end, table, what it has wound beyond its law, and
@@ -394,7 +393,7 @@ class Winches:
                 for at in (path, path + _NUDGE)
             )
             left[k] += (far - near) / _NUDGE
-        return np.clip(left, 0.0, 1.0)
+        return np.minimum(np.maximum(left, 0.0), 1.0)
 
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
         """Begin a step at ``time`` (s) in a state of the chain.
@@ -418,7 +417,8 @@ class Winches:
                 reading = state.reading(*place, float(slopes[place[0]]))
                 reading = replace(reading, time=time - winch.start_time)
                 rope = self._ropes.setdefault(k, anew)
-                rope.members[place] = winch.winding, reading, float(bends[place[0]])
+                bend, law = float(bends[place[0]]), winch.winding
+                rope.members[place] = law, reading, bend, *law.limits()
                 now = float(state.wound_rate[place])
                 rope.speeds_at[place] = now, float(rates[place])
                 rope.total += now

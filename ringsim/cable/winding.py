@@ -299,7 +299,9 @@ class MotorWinding(FeedbackWinding):
         """
         if self.ramp is None:
             return self.fastest, 0.0
-        phase = np.clip(time / self.ramp, 0.0, 1.0)
+        # Root finders ask for one instant ten thousand times a run, which numpy would make three.
+        alone = isinstance(time, float)
+        phase = min(max(time / self.ramp, 0.0), 1.0) if alone else np.clip(time / self.ramp, 0, 1)
         # The quintic step of ``RampWinding``, of many instants at once.
         share = phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
         return self.fastest * share, self.fastest * 30.0 * (phase * (1.0 - phase)) ** 2 / self.ramp
