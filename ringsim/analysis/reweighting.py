@@ -407,8 +407,11 @@ def _check_cover(path: str, old: Distribution, new: Distribution, samples: int) 
                     "leave it out, or run a campaign with it"
                 )
         return
-    # All but what is discrete has cumulative probabilities.
+    # All but what is discrete has cumulative probabilities, or should.
     cumulative: Any = new
+    if not hasattr(new, "probability"):
+        words = f"{show(kind_of(new))} has no probability(value): derive it from Continuous"
+        raise InputError(f"--reweight {path}: {words}")
     tail = 0.5 / samples
     for part, most, words in (
         (0.0, _BEYOND, "where no value was drawn"),

@@ -153,6 +153,7 @@ class FirstFrequency(Output):
     """
 
     rank = 49
+    of_both = True  # the tangent of frames, whichever engine has run
     needs = ("frequency",)
     variables = (
         Variable(
@@ -164,7 +165,7 @@ class FirstFrequency(Output):
     )  # fmt: skip
 
     def reduce(self, run: Run, series: Series) -> Values:
-        """Nothing: an engine's tangent tells it, see ``ringsim.simulation``."""
+        """Nothing: the tangent of frames tells it, see ``ringsim.simulation``."""
         return {}
 
 

@@ -394,7 +394,7 @@ def supply(need: str) -> str:
 
 _SUPPLIES = {
     "error bars": "set solver.error_bars = true",
-    "held base": 'set boom.base = "fixed"',
+    "held base or spacecraft": 'set boom.base = "fixed"',
     "second winch": "give its cables two, as [cables.lower.winch] or a far_winch",
     "prestress": "give rods.length_error or structure.hinge_error",
 }
@@ -423,7 +423,7 @@ def holds(scene: Scene) -> set[str]:
         "base": scene.boom is not None or scene.structure.supported,
         "latches": scene.stop is not None and scene.stop.latch and scene.structure.locks,
         "boundary net": scene.net is not None and scene.net.tells,
-        "held base": scene.held or scene.spacecraft is not None,
+        "held base or spacecraft": scene.held or scene.spacecraft is not None,
     }
     return {name for name, present in held.items() if present}
 

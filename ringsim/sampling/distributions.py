@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ringsim.choice import OneOf
+from ringsim.choice import OneOf, kind_of
 from ringsim.overrides import section_of
 from ringsim.refusal import InputError, show
 from ringsim.scene import Scene
@@ -153,7 +153,7 @@ class Distribution(Model):
 
         Raises TypeError for what is no value of this kind of distribution.
         """
-        raise NotImplementedError
+        raise InputError(f"a distribution of kind {show(kind_of(self))} has no log_density(values)")
 
 
 class Ranged(Distribution):
@@ -161,7 +161,7 @@ class Ranged(Distribution):
 
     def probability(self, value: float) -> float:
         """Cumulative probability of ``value``."""
-        raise NotImplementedError
+        raise InputError(f"a distribution of kind {show(kind_of(self))} has no probability(value)")
 
     def of_normal(self, normal: Array) -> Values:
         """Values at the same probabilities as those of a standard normal variable, same shape."""
