@@ -407,18 +407,13 @@ def _check_cover(path: str, old: Distribution, new: Distribution, samples: int) 
                     "leave it out, or run a campaign with it"
                 )
         return
-    # All but what is discrete has cumulative probabilities, or should.
-    cumulative: Any = new
-    if not hasattr(new, "probability"):
-        words = f"{show(kind_of(new))} has no probability(value): derive it from Continuous"
-        raise InputError(f"--reweight {path}: {words}")
     tail = 0.5 / samples
     for part, most, words in (
         (0.0, _BEYOND, "where no value was drawn"),
         (tail, max(_BEYOND_SAMPLES, 2 / samples), f"where hardly any of {samples} samples lie"),
     ):
         low, high = old.quantile(inside(np.array([part, 1 - part]))).tolist()
-        beyond = cumulative.probability(low) + 1 - cumulative.probability(high)
+        beyond = new.probability(low) + 1 - new.probability(high)
         if beyond > most:
             raise InputError(
                 f"--reweight {path}: {beyond:.2g} of the new distribution lies below {low:.4g} "

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -60,6 +60,18 @@ _SAME, _ALIKE = 1e-15, 1e-11
 which a rope of EA = 1e5 N takes no notice (1e-10 N)."""
 
 
+class _Member(NamedTuple):
+    """A winch that answers: its law, with the least and largest speed (m/s), what it read at the
+    beginning of the step, and how fast ``path_slope`` changes (m/rad/s).
+    """
+
+    law: FeedbackWinding
+    least: float
+    most: float
+    begun: WinchReading
+    bend: float
+
+
 @dataclass
 class _Rope:
     """A rope that winches with feedback wind in this step, as it was at the beginning."""
@@ -69,9 +81,8 @@ class _Rope:
     """Path (m), and natural length outside of the drums (m)."""
     material: list[float]
     """EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N)."""
-    members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading, float, float, float]]
-    """Laws, readings, how fast ``path_slope`` changes (m/rad/s), and the laws' least and largest
-    speeds (m/s), by cable and end (0 first, 1 far)."""
+    members: dict[tuple[int, int], _Member]
+    """By cable and end (0 first, 1 far)."""
     speeds_at: dict[tuple[int, int], tuple[float, float]]
     """Speeds of the members at the beginnings of this step and of the one before, m/s."""
     total: float
@@ -147,11 +158,14 @@ class _Rope:
         count, (stiffness, damping_time, width) = len(self.members), self.material
         follow = -self.takeup(elapsed, path, natural, -rate - rest)
         laws, low, high = [], 0.0, 0.0
-        for place, (law, begun, bend, least, most) in self.members.items():
-            slope, time = begun.path_slope + elapsed * bend, begun.time + elapsed
+        for place, (law, least, most, begun, bend) in self.members.items():
+            lagging, lag = self.lagging(place, elapsed)
+            # ``replace`` would take several times as long.
             seen = WinchReading(
-                begun.tension_ratio, follow / count, slope, time, *self.lagging(place, elapsed)
-            )
+                tension_ratio=begun.tension_ratio, path_rate=follow / count,
+                path_slope=begun.path_slope + elapsed * bend, time=begun.time + elapsed,
+                lagging=lagging, lag=lag,
+            )  # fmt: skip
             laws.append((law, seen, least, most))
             low, high = low + least, high + most
 
@@ -417,14 +431,14 @@ class Winches:
                 reading = state.reading(*place, float(slopes[place[0]]))
                 reading = replace(reading, time=time - winch.start_time)
                 rope = self._ropes.setdefault(k, anew)
-                bend, law = float(bends[place[0]]), winch.winding
-                rope.members[place] = law, reading, bend, *law.limits()
+                law, bend = winch.winding, float(bends[place[0]])
+                rope.members[place] = _Member(law, *law.limits(), reading, bend)
                 now = float(state.wound_rate[place])
                 rope.speeds_at[place] = now, float(rates[place])
                 rope.total += now
         self._turning = {}
         for k, rope in self._ropes.items():
-            laws = {place: law for place, (law, *_) in rope.members.items()}
+            laws = {place: member.law for place, member in rope.members.items()}
             if last > 0.0 and k in begun and all(past.get(p) is law for p, law in laws.items()):
                 wound, (path, length) = sum(float(moved[p]) for p in laws), begun[k]
                 rope.before = last, wound, path - rope.path - (length - rope.natural - wound)

@@ -299,7 +299,7 @@ class MotorWinding(FeedbackWinding):
         """
         if self.ramp is None:
             return self.fastest, 0.0
-        # Root finders ask for one instant ten thousand times a run, which numpy would make three.
+        # Root finders ask for one instant some ten thousand times a run; numpy is slow with one.
         alone = isinstance(time, float)
         phase = min(max(time / self.ramp, 0.0), 1.0) if alone else np.clip(time / self.ramp, 0, 1)
         # The quintic step of ``RampWinding``, of many instants at once.

@@ -324,8 +324,8 @@ def _to(run: Run, factor: float) -> str:
     solver = run.scene.solver
     if solver.step_control == "constant":
         return f"set solver.step = {_LESS * solver.step * factor:.2g}"
-    # Far shorter steps in turns: at the first the largest number may have been at a lock no more,
-    # and 3 times the steps were enough where 70 were asked for.
+    # Far shorter steps in turns: the largest number of the next run may lie at no lock any more.
+    # 3 times the steps were enough where 70 would have been told.
     factor = max(factor, _LEAST_FACTOR)
     tolerance = max(_LESS * solver.tolerance * factor**2, LEAST_TOLERANCE)
     followed = run.scene.record.stress and solver.deviation_tolerance < NO_DEVIATIONS

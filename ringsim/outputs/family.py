@@ -394,7 +394,7 @@ def supply(need: str) -> str:
 
 _SUPPLIES = {
     "error bars": "set solver.error_bars = true",
-    "held base or spacecraft": 'set boom.base = "fixed"',
+    "held base or spacecraft": 'set boom.base = "fixed", or give a spacecraft',
     "second winch": "give its cables two, as [cables.lower.winch] or a far_winch",
     "prestress": "give rods.length_error or structure.hinge_error",
 }

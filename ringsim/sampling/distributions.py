@@ -151,17 +151,20 @@ class Distribution(Model):
     def log_density(self, values: Values) -> Array:
         """Logarithm of the density, or of the probability of each value; -inf where there is none.
 
-        Raises TypeError for what is no value of this kind of distribution.
+        TypeError for what is no value of this kind of distribution, InputError if it is not known.
         """
-        raise InputError(f"a distribution of kind {show(kind_of(self))} has no log_density(values)")
+        raise InputError(_LACKS.format(show(kind_of(self)), "log_density(values)"))
+
+    def probability(self, value: float) -> float:
+        """Cumulative probability of ``value``; InputError if there is none, or it is not known."""
+        raise InputError(_LACKS.format(show(kind_of(self)), "probability(value)"))
+
+
+_LACKS = "kind {} has no {}, which this needs: write it in its class, derived from Continuous"
 
 
 class Ranged(Distribution):
     """A distribution over an interval of real numbers, cut off or not."""
-
-    def probability(self, value: float) -> float:
-        """Cumulative probability of ``value``."""
-        raise InputError(f"a distribution of kind {show(kind_of(self))} has no probability(value)")
 
     def of_normal(self, normal: Array) -> Values:
         """Values at the same probabilities as those of a standard normal variable, same shape."""

@@ -58,6 +58,14 @@ def test_steps_longer_than_an_eighth_of_its_period_are_told(record: str) -> None
 
 
 @pytest.mark.quick
+def test_far_too_long_steps_are_cured_in_turns() -> None:
+    """Of steps of ten periods, eighty times too long, by 0.15 at once."""
+    words = unresolved(run(10.0, reactions=True), AT_ONE)
+    first = 0.9 * load_scene("ring18").solver.tolerance * 0.15**2
+    assert f"set solver.tolerance = {first:.1e} (" in words
+
+
+@pytest.mark.quick
 def test_only_numbers_that_were_made_at_such_a_lock_are_told() -> None:
     """From the step that meets the lock, at 1 s, to four periods after it."""
     late = 1.0 + np.array([3.9, 4.5]) * PERIOD

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Correlation, Table
-from ringsim.sampling.distributions import Distribution, Normal, Ranged
+from ringsim.sampling.distributions import Distribution, Normal
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import read_design, write_design
@@ -108,10 +108,10 @@ def test_a_design_of_a_fidelity_that_does_not_exist_is_refused(tmp_path: Path) -
 
 def test_what_a_distribution_of_ones_own_lacks_is_told() -> None:
     law = Normal(mean=0.0, standard_deviation=1.0)
-    with pytest.raises(InputError, match='of kind "normal" has no log_density'):
+    with pytest.raises(InputError, match=r'^kind "normal" has no log_density.* from Continuous$'):
         Distribution.log_density(law, np.zeros(1))
-    with pytest.raises(InputError, match='of kind "normal" has no probability'):
-        Ranged.probability(law, 0.0)
+    with pytest.raises(InputError, match=r'^kind "normal" has no probability.* from Continuous$'):
+        Distribution.probability(law, 0.0)
 
 
 def test_a_grid_crosses_tables_and_faults() -> None:
