@@ -193,6 +193,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
             return f"{shown} must be a list of {size} numbers{f' in{unit}' if unit else ''}"
         case "tuple_type" if tables:
             return f"{shown} must be a list of tables: write [[{where}]], and its keys below"
+        case "tuple_type" if field and typing.get_origin(field.annotation) is tuple:
+            return f"{shown} must be a list: {where} = [..., ...]"
         case "value_error":
             text = str(limits["error"])
             return f"{where}.{text}" if where and not text.startswith(where) else text

@@ -256,5 +256,8 @@ def _shapes(last: xr.Dataset) -> Table:
         for axis, own in last["effective_mass"].groupby("axis"):
             masses[f"effective mass along {axis} (kg)"] = own.squeeze("axis").values
     rows += [[n, *(f"{mass:.3g}" for mass in own.round(9) + 0.0)] for n, own in masses.items()]
-    title = f"Shapes at {last['angle'].item():.4g} deg, and what stores their energy:"
+    title = (
+        f"Shapes at {last['angle'].item():.4g} deg, and which part their stiffness has from what "
+        "(below zero: what a force takes from it):"
+    )
     return Table(["mode", *map(str, last["mode"].values)], rows, title=title)

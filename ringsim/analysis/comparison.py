@@ -356,7 +356,7 @@ _SCENES_OWN = ("name", "title")
 def settings(both: Both) -> dict[str, Any]:
     """The values in which the scenes differ, as text by path: ``setting_first``, ``_second``.
 
-    Fidelities are among them, and behind them the distributions and requirements of campaigns.
+    Fidelities are among them, and before them the distributions and requirements of campaigns.
     A value that one of them lacks is "none".  No values if a file does not hold its scene.
     """
     scenes = [flat(tomllib.loads(str(each.attrs.get("scene", "")))) for each in both]
@@ -376,11 +376,11 @@ def settings(both: Both) -> dict[str, Any]:
         name for name in dict.fromkeys([*asked[0], *asked[1]])
         if asked[0].get(name) != asked[1].get(name)
     ]  # fmt: skip
-    names = np.array(apart + other, dtype=object)
+    names = np.array(other + apart, dtype=object)
     found: dict[str, Any] = {"setting": ("setting", names)}
     for side, scene, words in zip(SIDES, scenes, asked, strict=True):
-        told = [show(scene[path]) if path in scene else "none" for path in apart]
-        told += [words.get(name, "none") for name in other]
+        told = [words.get(name, "none") for name in other]
+        told += [show(scene[path]) if path in scene else "none" for path in apart]
         about_it = {"long_name": f"value in the {side}"}
         found[f"setting_{side}"] = "setting", np.array(told, dtype=object), about_it
     return found

@@ -24,7 +24,7 @@ from ringsim.tables import (
 )
 from ringsim.variables import Fate
 
-_NAMED = 20
+_NAMED, _VALUES = 20, 60
 """Changed outcomes, and values of scenes, that are listed at most."""
 _ALIKE = 1e-3
 """Difference over the larger mean below which neither is told to be worse, however sure it is."""
@@ -222,9 +222,9 @@ def _settings(found: xr.Dataset) -> Table:
     paths, count = found["setting"].values.tolist(), found.sizes["setting"]
     columns = (found[f"setting_{side}"].values.tolist() for side in ("first", "second"))
     rows = [(str(p), str(a), str(b)) for p, a, b in zip(paths, *columns, strict=True)]
-    more = f"and {count - _NAMED} more; ringsim compare --out FILE.nc stores all"
-    notes = [more] * (count > _NAMED)
-    return Table(("differs in", *names_of(found)), rows[:_NAMED], notes, left=3)
+    more = f"and {count - _VALUES} more; ringsim compare --out FILE.nc stores all"
+    notes = [more] * (count > _VALUES)
+    return Table(("differs in", *names_of(found)), rows[:_VALUES], notes, left=3)
 
 
 def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:

@@ -198,8 +198,10 @@ def _told(name: str, rows: Array, value: float, units: str) -> str:
     middle = float(np.median(rows))
     end = {rows.min(): ", the lowest", rows.max(): ", the highest"}.get(value, "")
     if units == "K" and not name.startswith(DIFFERENCE):
-        word = "cold" if value < middle else "hot"
-        return f"{name} {value:.4g} K ({value - _ZERO:+.0f} C, {word}{end})"
+        colder = float(np.mean(rows < value))
+        sense, share = ("warmer", colder) if value > middle else ("colder", np.mean(rows > value))
+        than = f", {sense} than {100.0 * share:.0f} %" * (not end)
+        return f"{name} {value:.4g} K ({value - _ZERO:+.0f} C{than}{end})"
     if rows.min() > 0.0 or rows.max() < 0.0:
         ratio = value / middle
         far = f"{100.0 * (ratio - 1.0):+.0f} %" if ratio < 3.0 else f"{ratio:.2g} times"

@@ -188,7 +188,8 @@ def _predicted(
         written = (file.stat().st_size for file in (order.folder / "journals").iterdir())
         size = sum(written) / runs
     elif like * _FULL > _SHORT:
-        per_cost, size = like * _FULL / float(cost[todo].mean()), 0.0
+        # Of all samples, whose mean it is: those that are checked are mostly those with error bars.
+        per_cost, size = like * _FULL / float(cost.mean()), 0.0
         basis = f"estimated as {_FULL:g} times a sample's: a trial would take as long"
     else:
         trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
@@ -384,7 +385,7 @@ def status_lines(campaign: Folder) -> list[str]:
             rate = workers * ended[0] / max(spent[0], 1e-9)
             beside = " (without checks)" * bool(ended[1])
             lines.append(f"  rate           {rate:.3g} samples/s{beside}")
-        about = time_left(campaign, left, spent / np.maximum(ended, 1), workers)
+        about = time_left(campaign, spent / np.maximum(ended, 1), workers)
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     if left and (changed := other_build(campaign)):
         on = "; its workers go on with the build that began it" if workers else ""
@@ -403,11 +404,17 @@ def _next(campaign: Folder, left: int, growth: str) -> str:
     return f"ringsim {verb} {folder}"
 
 
-def time_left(campaign: Folder, samples: int, each: NDArray[np.float64], workers: int) -> str:
+def time_left(campaign: Folder, each: NDArray[np.float64], workers: int) -> str:
     """About how long samples, and checks by the other engine, take that are left; ``each`` are the
-    seconds of one of either, 0 where none has ended.
+    seconds of one of either that has ended, 0 where none has.
     """
-    checks = len(campaign.unchecked())
+    cost, open_ = relative_cost(campaign.table, campaign.scene), campaign.unchecked()
+    over = np.setdiff1d(campaign.checked, open_)
+    found = campaign.survey()
+    done = np.setdiff1d(np.arange(len(cost)), found.missing)
+    # The longest ones, as those with error bars, run first: what is left is cheaper.
+    each = each * [_dearer(cost, found.missing, done), _dearer(cost, open_, over)]
+    samples, checks = len(found.missing), len(open_)
     rest = [(n, seconds) for n, seconds in ((samples, each[0]), (checks, each[1])) if n]
     known = [(n, seconds) for n, seconds in rest if seconds]
     if not known:
@@ -419,6 +426,11 @@ def time_left(campaign: Folder, samples: int, each: NDArray[np.float64], workers
         rest_of = counted(samples, "sample") if each[1] else counted(checks, "check")
         told += f", plus {rest_of} of unknown duration"
     return told
+
+
+def _dearer(cost: Array, some: Samples, others: Samples) -> float:
+    """Predicted cost of one of some samples over that of one of the others; 1 without either."""
+    return float(cost[some].mean() / cost[others].mean()) if len(some) and len(others) else 1.0
 
 
 def _stopping(campaign: Folder, planned: int, end: End | None) -> list[str]:

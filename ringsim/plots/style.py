@@ -518,9 +518,21 @@ def limit_of(dataset: xr.Dataset, name: str) -> float:
     return math.nan if limit is None else float(limit)
 
 
+_FAR_ABOVE = 4.0
+"""Limit over the upper end of an axis from which on it is named and not drawn."""
+
+
 def draw_limit(axes: Axes, limit: float, words: str) -> None:
-    """A dashed line at a limit, with its name at its left end; nothing at NaN."""
+    """A dashed line at a limit, with its name at its left end; nothing at NaN.
+
+    Of one that is far above what was drawn before the name alone: its line would leave curves a
+    strip at the foot.
+    """
     if math.isnan(limit):
+        return
+    if axes.has_data() and limit > _FAR_ABOVE * axes.get_ylim()[1]:
+        axes.annotate(f"{words}, far above", (0.0, 1.0), xytext=(4, -11), color=VERMILION,
+                      xycoords="axes fraction", textcoords="offset points", fontsize=9)  # fmt: skip
         return
     axes.axhline(limit, color=VERMILION, linewidth=1.2, linestyle=(0, (5, 2)))
     axes.annotate(words, (0.0, limit), xytext=(4, 2), xycoords=axes.get_yaxis_transform(),

@@ -182,7 +182,11 @@ def _temperature(of: Of) -> Answer:
         cure = "draw temperature.joint.value, temperature.pulley.value or an input of unit K"
         return found + Answer(lacks={"scatter of temperatures": cure})
     found.result += fates(of)
-    found.lacks["gradients"] = "parts of one kind have one temperature: other cases by [set]"
+    one = re.compile(r"temperature\.\w+\.value")
+    drawn = (of.campaign[n].ndim > 1 for path, n in by_path(of.campaign).items() if one.match(path))
+    lists = (isinstance(v, list) for path, v in of.scene.items() if one.match(path))
+    if not any([*drawn, *lists]):
+        found.lacks["gradients"] = "draw temperature.joint.value with each_section, or set a list"
     return found
 
 
@@ -415,7 +419,7 @@ def _pedigree(of: Of) -> Answer:
     return found
 
 
-_UNMEASURED = "numerical errors not measured"
+_UNMEASURED = "no error bars (error_bars_every), numerical errors not known"
 
 
 @item(NASA, "factor 4, results uncertainty (second-hand)", "How uncertain the results are.")

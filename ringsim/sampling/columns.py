@@ -191,7 +191,8 @@ class Correlation(Model):
     """
 
     between: Annotated[tuple[str, str], ListIn]
-    """Scene paths, or names, of the two inputs."""
+    """Scene paths, or names, of the two inputs.  Of an input with ``each_section`` the values of
+    all places, of two of them those of the same place."""
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
     """Correlation of the underlying normal variables."""
 

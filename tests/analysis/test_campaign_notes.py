@@ -146,6 +146,13 @@ def test_a_verdict_says_so_if_what_may_be_off_could_change_it() -> None:
             assert gate == ([] if stands and most > 50.0 else [f"{row[0]}: {row[1]}"])
             seen.add((most, stands))
     assert len(seen) == 4
+    every = with_doubts(made, dict.fromkeys(range(30), "peak_tension"))  # of 20 to 49 N
+    hold = "if its numbers hold: may be off in"
+    for most, told in ((475.0, f"met, {hold} 2 of 30 samples"), (500.0, "met"),
+                       (4.45, f"not met, {hold} 25 of 30 samples"), (1.9, "not met")):  # fmt: skip
+        wanted = {"peak_tension": {"max": most, "probability": 0.9, "confidence": 0.9}}
+        (row,) = verdict_table(analyse(every, wanted)).rows
+        assert row[1] == told
 
 
 def test_a_verdict_says_so_if_numerical_errors_could_change_it() -> None:

@@ -96,14 +96,14 @@ def test_what_is_far_out_is_told_in_words() -> None:
     )  # fmt: skip
     cold, second, usual, odd, word = unusual(one, [0, 1, 10, 9, 19])
     assert cold == (
-        "temperature 243.1 K (-30 C, cold, the lowest); "
+        "temperature 243.1 K (-30 C, the lowest); "
         "section 1 of friction 0.00099 m (-1 %, the lowest)"
     )
     assert second == "nothing unusual"  # one of ten is as cold
     assert usual == "nothing unusual"
     assert odd == "section 4 of friction 0.0015 m (+50 %, the highest)"
     assert "word = b (as in 1 of 20)" in word
-    assert "temperature 343.1 K (+70 C, hot, the highest)" in word
+    assert "temperature 343.1 K (+70 C, the highest)" in word
 
 
 def test_chance_makes_one_sample_in_ten_unusual() -> None:

@@ -239,6 +239,14 @@ def test_of_a_check_that_takes_long_the_cost_is_estimated_and_none_is_run(tmp_pa
     assert "estimated as 30 times a sample's" in cost
     assert 20.0 <= float(cost.split()[3]) < 60.0
     assert "trial run of the check" not in printed
+    # Of those with error bars a check has them, too.
+    path.write_text("error_bars_every = 2\n" + path.read_text())
+    call = *CALL[:2], "--out", "new", *CALL[4:], "--dry-run"
+    printed = bench.run(*call, solver="fake_solver:slow")
+    own, judged = re.findall(r"  cost (?: |of checks)  *(\S+) s each (.*)", printed)
+    barred = own[1].partition("bars ")[2].partition(" s)")[0].split(" to ")
+    assert 29.5 * float(barred[0]) <= float(judged[0]) <= 30.5 * float(barred[-1])
+    assert 25.0 * float(own[0]) < float(judged[0])
 
 
 def test_replay_repeats_the_check_too(checked):

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ import xarray as xr
 from campaign_bench import MODULES, Bench, comparable, journals, lose, opened, records
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.plan import time_left
+from ringsim.execution.work import relative_cost
 
 
 @pytest.fixture(scope="module")
@@ -225,16 +227,29 @@ def test_replay_runs_no_code_that_a_file_names(copied):
 def test_time_left_counts_samples_and_checks_apart(copied):
     """Two of ten samples are to run, of 4 s each, and two checks of 30 s, by two workers."""
     folder = open_folder(copied.folder / "out")
-    left, each = 2, np.array([4.0, 30.0])
-    checked = SimpleNamespace(unchecked=lambda: np.array([0, 5]))
-    assert time_left(checked, left, each, 2) == "about 34 s"
-    assert time_left(checked, left, np.array([4.0, 0.0]), 2) == (
+    each = np.array([4.0, 30.0])
+    half = {"scene": folder.scene, "checked": np.array([0, 5])}
+    half["table"] = SimpleNamespace(columns=(), samples=10)
+    half["survey"] = lambda: SimpleNamespace(missing=np.array([8, 9]))
+    checked = SimpleNamespace(**half, unchecked=lambda: np.array([0, 5]))
+    without = SimpleNamespace(**half, unchecked=lambda: np.empty(0, dtype=int))
+    assert time_left(checked, each, 2) == "about 34 s"
+    assert time_left(checked, np.array([4.0, 0.0]), 2) == (
         "about 4 s, plus 2 checks of unknown duration"
     )
-    assert time_left(folder, left, each, 2) == "about 4 s"
+    assert time_left(without, each, 2) == "about 4 s"
     # The last one leaves workers idle; nothing is known before one has ended.
-    assert time_left(folder, 1, np.array([100.0, 0.0]), 48) == "about 100 s"
-    assert time_left(checked, left, np.zeros(2), 2) == "not known yet"
+    assert time_left(without, np.array([100.0, 0.0]), 48) == "about 100 s"
+    assert time_left(checked, np.zeros(2), 2) == "not known yet"
+    # Two of the 18 that are over had error bars, and took three times as long or more.
+    bars = np.isin(np.arange(20), [0, 5])
+    column = replace(folder.table.columns[0], path="solver.error_bars", values=bars)
+    half["table"] = replace(folder.table, columns=(column,))
+    whole = relative_cost(half["table"], folder.scene)
+    mean = 50.0 * np.delete(whole, [8, 9]).mean()
+    barred = SimpleNamespace(**half, unchecked=lambda: np.empty(0, dtype=int))
+    assert whole[0] > 2.0 * whole[9]
+    assert time_left(barred, np.array([mean, 0.0]), 1) == f"about {100.0 * whole[9]:.0f} s"
 
 
 @pytest.mark.slow  # a signal to one rank, test_campaign_together.py, goes the same way

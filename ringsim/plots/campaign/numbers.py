@@ -45,7 +45,7 @@ from ringsim.plots.campaign.frame import (
     standing,
 )
 from ringsim.plots.campaign.tornado import is_one_by_one
-from ringsim.tables import readable, unit_behind, with_unit
+from ringsim.tables import counted, readable, unit_behind, with_unit
 
 _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
@@ -363,7 +363,8 @@ def by_input(campaign: xr.Dataset) -> Figure:
         else ""
     )
     if others > 0:
-        note += f" Not drawn: {others} inputs whose rank correlation with the number is smaller."
+        left = f"{counted(others, 'input')} whose rank correlation with the number is smaller"
+        note += f" Not drawn: {left}."
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
     # asynchrony_max, deployment_time
     judged = f"{name.removesuffix('_max').replace('_', ' ')} and outcome by input"
