@@ -2,7 +2,7 @@
 # /// script
 # dependencies = ["nox>=2025.2.9"]
 # ///
-"""What is tried before a release: ``nox`` runs all of it, ``nox -s lint`` one part."""
+"""What is tried before a release: ``nox`` runs all sessions, ``nox -s lint`` one."""
 
 from pathlib import Path
 

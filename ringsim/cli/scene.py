@@ -139,6 +139,10 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
             click.echo(f"{'' if number else label:<{wide}}{line.replace(_TIED, ' = ')}")
     for line in _doubtful(loaded):
         click.echo(f"doubtful: {line}")
+    if loaded.imports:
+        from ringsim.frame.model import try_laws
+
+        try_laws(loaded)
     lacking = _lacking(loaded)
     outside = loaded.controller is not None and loaded.controller.outside
     how = "ringsim.steps in Python steps it" if outside else "ringsim run FILE runs it"

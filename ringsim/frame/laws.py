@@ -139,9 +139,13 @@ def taped(laws: Sequence[tuple[Law, tuple[int, ...], object]], inputs: int, resu
                 raise TypeError(f"it returns {len(told)} values, not {results}")
             for place, each in enumerate(told, inputs):
                 notes.end(each, place)
-        except (TypeError, AttributeError, ValueError) as error:
-            known = ", ".join(each.__name__ for each in _KNOWN)
+        except (TypeError, AttributeError, NameError, ValueError) as error:
             where = line_in(_files_of(record), error)
+            typo = isinstance(error, AttributeError) and not isinstance(error.obj, Row)
+            if typo or isinstance(error, NameError):  # no engine could run it
+                name = type(record).__name__
+                raise InputError(f"the law of {name} does not work: {error}{where}") from error
+            known = ", ".join(each.__name__ for each in _KNOWN)
             raise InputError(
                 f"{NOT_HERE} the law of {type(record).__name__}: {error}{where} (write it with "
                 f"arithmetic and numpy's {known} on each number, or {CURE})"

@@ -43,6 +43,17 @@ _WIND, _FORCES, _ANSWER, _SLOPES = range(4)
 _BALANCED, _UNBALANCED, _ENDLESS, _SMALL_PIVOT, _NO_TENSIONS, _RAISED = range(6)
 
 
+def try_laws(scene: Scene) -> None:
+    """Call all laws of a scene once: InputError if one has a slip; those of scenes that frames do
+    not represent stay untried.
+    """
+    try:
+        FrameModel(scene)
+    except InputError as error:
+        if NOT_HERE not in str(error):
+            raise
+
+
 class System(NamedTuple):
     """What the core sees of a model: its parts, and room for what it finds in a step: what elements
     keep, residual, changes since a tangent, and ``FrameModel.reaction``; ``lengths`` and their
@@ -257,7 +268,7 @@ class FrameModel:
         words = {
             _UNBALANCED: f"Newton's residual is {norm:.3g} N after {iterations} iterations, "
             f"step {step:.3g} s",
-            _ENDLESS: "the state is not finite",
+            _ENDLESS: "forces or places are no finite numbers, as of a law outside of its domain",
             _SMALL_PIVOT: "a pivot of the tangent is too small",
         }
         return Balanced(iterations, tangents, words.get(how, why))

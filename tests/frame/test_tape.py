@@ -151,6 +151,18 @@ def test_what_tapes_do_not_know_is_refused(law: Any, cause: str) -> None:
         taped([(law, SHAPE, STOP)], 1, 1)
 
 
+@for_each(
+    ("law", "cause"),
+    [
+        (lambda x: x * STOP.stiffnes, "no attribute 'stiffnes'"),
+        (lambda x: x * stifness, "name 'stifness' is not defined"),  # noqa: F821
+    ],
+)
+def test_a_slip_in_a_law_is_told_as_what_it_is(law: Any, cause: str) -> None:
+    with pytest.raises(InputError, match=f"^the law of .*Stop does not work: .*{cause}"):
+        taped([(law, SHAPE, STOP)], 1, 1)
+
+
 def test_numbers_that_are_none_stay_so() -> None:
     x = np.full(SHAPE, np.nan)
     tape = taped([(lambda x: np.maximum(x, 0.0) + np.minimum(0.0, x), SHAPE, None)], 1, 1)
