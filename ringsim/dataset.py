@@ -210,7 +210,7 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
         "date_created": now,
         "source": f"{software}: {fidelity.model}{library}",
         "fidelity": fidelity.word,
-        "creator_name": "ringsim",
+        "license": "None",
         **build.provenance(),
         **{f"{name}_version": version(name) for name in ("exudyn", "numpy")},
         "python_version": platform.python_version(),

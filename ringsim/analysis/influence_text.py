@@ -199,7 +199,7 @@ HEADS = {
 }  # fmt: skip
 
 
-FEW_DECIDE = "few samples decide it"
+FEW_DECIDE = "not known: few samples decide it"
 """Instead of an interval that is longer than all that is possible, or leaves it."""
 
 

@@ -27,6 +27,7 @@ from ringsim.storage import netcdf
 from ringsim.storage.journal import FOLDER, DamagedError, Survey
 from ringsim.storage.netcdf import GO_ON, PER_SAMPLE, OutputTable, attributes_of_file, locked
 from ringsim.storage.result import sample_of, stacked
+from ringsim.tables import counted
 from ringsim.variables import Cause, Fidelity, Status, Variable
 
 _KEPT = (
@@ -41,18 +42,21 @@ _KEPT = (
 def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, Path | None]:
     """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
 
-    ``execution`` says who computed it; if samples or checks are left, it is written only if
-    ``partly``.  Of a campaign that its rule has ended it holds the samples up to there.  Returns
-    the number of samples left, of failed ones, and the file, or None if it is not written.
+    ``execution`` says who computed it, empty where nobody knows; if samples or checks are left, it
+    is written only if ``partly``.  Of a campaign that its rule has ended it holds the samples up to
+    there.  Returns the number of samples left, of failed ones, and the file, or None if it is not
+    written.
     InputError if the folder cannot be written to, or no sample at all has run.
     """
     path, design = campaign.path / MERGED, campaign.attributes
     model, planned = Fidelity[design.get("fidelity", "full").upper()], campaign.table.samples
     name, title = design["campaign_name"], design["title"]
     made = attributes_of_file(name=name, title=title, action="merged", model=model)
-    attributes = made | {n: design[n] for n in _KEPT if n in design} | {"execution": execution}
-    attributes["history"] += f"\n{design['history']}"
+    journals = counted(len([*(campaign.path / FOLDER).glob("*.journal")]), "journal")
     output = OutputTable.model_validate_json(design["output"])
+    attributes = made | {n: design[n] for n in _KEPT if n in design} | output.stated()
+    attributes["execution"] = execution or f"merged on its own, from {journals}"
+    attributes["history"] += f"\n{design['history']}"
     with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):
         for draft in campaign.path.glob(f".{MERGED}.*{DRAFT}"):
             draft.unlink(missing_ok=True)

@@ -155,9 +155,9 @@ class Campaign:
         """Run what is missing in the folder ``out`` (runs/NAME), and return the merged campaign.
 
         Solver processes are programs of their own (``python -m ringsim.execution.child``), not
-        copies of the script: it needs no ``if __name__ == "__main__"``.  What it has defined they
-        do not know: kinds of one's own stand in a module that ``imports`` names, or need
-        ``workers = 0``.
+        copies of the script: without an executor it needs no ``if __name__ == "__main__"``, with
+        one that starts processes it does.  What it has defined they do not know: kinds of one's own
+        stand in a module that ``imports`` names, or need ``workers = 0``.
 
         Parameters
         ----------
@@ -338,8 +338,9 @@ def _round(executor: Executor, parts: int, order: Order, *, more: bool) -> set[i
     if lost:
         number, cause = min(lost, key=lambda each: each[0])
         why = f"{type(cause).__name__}: {cause}"
-        told = f"{order.folder}: part {number}/{parts} was lost ({why})"
-        raise CampaignError(f"{told}: call again to run what is left") from cause
+        told = f"{order.folder}: part {number}/{parts} was lost ({why}): call again to run what is"
+        guard = 'a script needs if __name__ == "__main__": around the call'
+        raise CampaignError(f"{told} left; if no part has begun, {guard}") from cause
     return codes
 
 
@@ -367,7 +368,7 @@ def open_campaign(path: str | Path) -> xr.Dataset:
     """
     path = Path(path)
     if path.is_dir() and is_behind(path):
-        merge(open_folder(path), execution="merged on its own", partly=True)
+        merge(open_folder(path), execution="", partly=True)
     found = open_stored(path)
     if "sample" not in found.dims or "status" not in found:
         found.close()

@@ -227,7 +227,9 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
 
     stop.at_once = True
     try:
-        left, failed, path = merge(campaign, execution=choices.scheduler.description, partly=False)
+        whole = choices.share.count
+        by = choices.scheduler.description + f" in each of {whole} parts" * (whole > 1)
+        left, failed, path = merge(campaign, execution=by, partly=False)
     except KeyboardInterrupt:
         _tell(f"{stop.reason}; the results are not merged yet: run the same command again")
         return EXIT_INTERRUPTED

@@ -45,7 +45,7 @@ def opened(path: Path) -> xr.Dataset:
     there nothing is: its end merges them.  InputError if there is none.
     """
     if any(path.glob("journals/*")) and is_behind(path) and not runs_in(path):
-        left, _, _ = merge(open_folder(path), execution="merged on its own", partly=True)
+        left, _, _ = merge(open_folder(path), execution="", partly=True)
         told = f", {counted(left, 'sample')} not run" if left else ""
         click.echo(f"{path}: merged its results into {MERGED}{told}")
     if path.is_dir() and not (path / MERGED).exists() and runs_in(path):
@@ -66,7 +66,7 @@ def merge_command(folder: Path) -> None:
     from ringsim.analysis.study_text import verdict_lines
 
     campaign = open_folder(folder)
-    left, failed, path = merge(campaign, execution="merged on its own", partly=True)
+    left, failed, path = merge(campaign, execution="", partly=True)
     samples = as_decided(campaign).table.samples
     click.echo(
         f"{path}: {counted(samples, 'sample')}, {samples - left} done, {left} not run, "

@@ -7,14 +7,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
 import xarray as xr
 
 from ringsim.analysis import campaign_notes as notes
-from ringsim.analysis.intervals import quantities
+from ringsim.analysis.intervals import good, numbers, quantities
+from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.study_text import outcome_table, unit_of
 from ringsim.analysis.verdicts import BOUND, SHARE_MET, verdict_table
 from ringsim.report.page import drawn_inputs
 from ringsim.tables import Table, counted, number_text, with_unit
+from ringsim.variables import GOALS, Fate
 
 
 class Of(NamedTuple):
@@ -110,7 +113,11 @@ def evidence_of(of: Of, name: str) -> str:
     """Of how many samples an output is, and its largest numerical errors."""
     used, lost, absent, _ = of.analysis[f"{name}_samples"].values
     cell, unit = cells_of(of.errors, name), unit_of(of.analysis, name)[1]
-    words = [f"{used} of {used + lost + absent} samples"]
+    words, campaign = [f"{used} of {used + lost + absent} samples"], of.campaign
+    if OUTCOME in campaign and len(campaign[OUTCOME]) == used + lost + absent:
+        valued = good(campaign) & np.isfinite(numbers(campaign, name))
+        short = int((valued & ~np.isin(campaign[OUTCOME], [-1, Fate.NONE, *GOALS])).sum())
+        words[0] += f", {short} of them as they ended, not deployed" * bool(short)
     for most, count, told in (
         ("largest bar", "samples with bars", "error bar"),
         ("largest difference", "samples checked", "engine difference"),

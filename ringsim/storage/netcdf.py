@@ -47,6 +47,10 @@ PER_SAMPLE = {name: VARIABLES[name] for name in ("status", "cause")} | {
 """What is known of every sample beside its outputs."""
 
 
+NO_LICENSE = "None"
+"""What ACDD wants to read where nobody has stated a licence."""
+
+
 class OutputTable(Model):
     """How ``campaign.nc`` stores the results."""
 
@@ -60,6 +64,10 @@ class OutputTable(Model):
     """Decimal digits that are kept, by variable; the rest is rounded away before compression."""
     leave_out: list[str] = Field(default_factory=list)
     """Output variables that the merged file does not hold."""
+    license: Annotated[str, Field(max_length=500)] = NO_LICENSE
+    """Under which terms others may use the file: a name or address of a licence."""
+    creator: Annotated[str, Field(max_length=500)] = ""
+    """Who answers for the results: a person, group or institution."""
 
     @model_validator(mode="after")
     def _known(self) -> "OutputTable":
@@ -68,6 +76,10 @@ class OutputTable(Model):
                 hint = known_or_nearest(name, VARIABLES)
                 raise ValueError(f"{name} is not an output variable ({hint})")
         return self
+
+    def stated(self) -> dict[str, str]:
+        """Attributes of the file that its makers state."""
+        return {"license": self.license} | ({"creator_name": self.creator} if self.creator else {})
 
 
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
@@ -185,7 +197,7 @@ def attributes_of_file(*, name: str, title: str, action: str, model: Fidelity) -
         "history": f"{now} {action} by {software}",
         "date_created": now,
         "source": f"{software}: {model.model}", "fidelity": model.word,
-        "creator_name": "ringsim", "creator_type": "institution", "creator_software": software,
+        "license": NO_LICENSE, "creator_software": software,
         "python_version": platform.python_version(), "platform": platform.platform(),
         "host": platform.node(), **build.provenance(), **versions,
     }  # fmt: skip

@@ -59,7 +59,7 @@ def test_file_says_what_everything_is(reference):
     assert len(reference.status.attrs["flag_meanings"].split()) == len(flags)
     assert reference.status.dtype == np.int8
     assert (reference.status == 0).all()
-    for name in ("title", "summary", "history", "date_created", "creator_name", "Conventions"):
+    for name in ("title", "summary", "history", "date_created", "license", "Conventions"):
         assert reference.attrs[name]
     assert int(reference.attrs["seed"]) == 7
     assert "ring6" in reference.attrs["scene"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -42,6 +43,32 @@ if __name__ == "__main__":
         with Client(cluster) as client:
             growing().run(2, out="parts", executor=client.get_executor())
 """
+KILLED = """
+import os, pathlib, signal, threading, time
+from distributed import Client, LocalCluster
+def kill(pid):
+    folder = pathlib.Path("o/journals")
+    while not folder.exists() or not any(each.stat().st_size for each in folder.iterdir()):
+        time.sleep(0.05)
+    os.kill(pid, signal.SIGKILL)
+    print("killed")
+if __name__ == "__main__":
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with Client(cluster) as client:
+            pid = min(client.run(os.getpid).values())
+            threading.Thread(target=kill, args=(pid,), daemon=True).start()
+            try:
+                made().run(2, out="o", executor=client.get_executor())
+            except ringsim.CampaignError as lost:
+                print(lost)
+                made().run(2, out="o", executor=client.get_executor())
+"""
+BY_RANKS = """
+from mpi4py.futures import MPIPoolExecutor
+if __name__ == "__main__":
+    with MPIPoolExecutor() as pool:
+        made().run(2, out="o", executor=pool)
+"""
 NAMES: dict[str, Any] = {}
 exec(textwrap.dedent(MADE), NAMES)
 
@@ -75,26 +102,24 @@ def require_same(folder: Path, known: xr.Dataset) -> None:
 
 @pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: ringsim[mpich]")
 def test_ranks_of_mpi_give_what_workers_give(tmp_path: Path, known: xr.Dataset) -> None:
-    done = in_a_script(
-        """
-        from mpi4py.futures import MPIPoolExecutor
-        if __name__ == "__main__":
-            with MPIPoolExecutor() as pool:
-                made().run(2, out="o", executor=pool)
-        """,
-        tmp_path, str(MPIEXEC), "-n", "3", sys.executable, "-m", "mpi4py.futures",
-    )  # fmt: skip
+    launcher = str(MPIEXEC), "-n", "3", sys.executable, "-m", "mpi4py.futures"
+    done = in_a_script(BY_RANKS, tmp_path, *launcher)
     assert done.returncode == 0, done.stderr
     require_same(tmp_path / "o", known)
+
+
+def wait_for_a_sample(out: Path) -> None:
+    folder, end = out / "journals", time.monotonic() + 200.0
+    while not folder.exists() or not any(each.stat().st_size for each in folder.iterdir()):
+        assert time.monotonic() < end, "no sample has ended"
+        time.sleep(0.05)
 
 
 def test_a_killed_worker_loses_nothing(tmp_path: Path, known: xr.Dataset) -> None:
     """The call says which part, and the same call goes on with what is left."""
 
     def kill(pool: ProcessPoolExecutor) -> None:
-        folder = tmp_path / "o" / "journals"
-        while not folder.exists() or not any(each.stat().st_size for each in folder.iterdir()):
-            time.sleep(0.05)
+        wait_for_a_sample(tmp_path / "o")
         os.kill(next(iter(pool._processes)), signal.SIGKILL)
 
     with ProcessPoolExecutor(2) as pool, ThreadPoolExecutor(1) as other:
@@ -107,6 +132,35 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path, known: xr.Dataset) -> Non
         found = made().run(2, out=tmp_path / "o", executor=pool)
     xr.testing.assert_equal(comparable(found).drop_attrs(), known.drop_attrs())
     assert all(each.exists() and each.stat().st_size >= size for each, size in before.items())
+
+
+@pytest.mark.slow  # a killed worker of a process pool, above, goes the same way
+@pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: ringsim[mpich]")
+def test_a_killed_rank_loses_nothing(tmp_path: Path, known: xr.Dataset) -> None:
+    """MPI ends the job; the same command goes on with what is left."""
+    (tmp_path / "script.py").write_text(textwrap.dedent(MADE) + BY_RANKS, encoding="utf-8")
+    command = [str(MPIEXEC), "-n", "3", sys.executable, "-m", "mpi4py.futures", "script.py"]
+    job = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    wait_for_a_sample(tmp_path / "o")
+    ranks = [
+        int(each.parent.name) for each in Path("/proc").glob("[0-9]*/cmdline")
+        if each.read_bytes().split(b"\0")[1:4] == [b"-m", b"mpi4py.futures", b"script.py"]
+    ]  # fmt: skip
+    os.kill(max(ranks), signal.SIGKILL)
+    assert job.wait(timeout=60) != 0
+    subprocess.run(command, cwd=tmp_path, check=True, timeout=300)
+    require_same(tmp_path / "o", known)
+
+
+@pytest.mark.slow  # it starts a cluster
+def test_a_killed_worker_of_dask_loses_nothing(tmp_path: Path, known: xr.Dataset) -> None:
+    """The cluster starts the worker and its task anew, or the same call goes on."""
+    pytest.importorskip("distributed")
+    done = in_a_script(KILLED, tmp_path, sys.executable)
+    assert done.returncode == 0, done.stderr
+    assert "killed" in done.stdout
+    found = comparable(ringsim.open_campaign(tmp_path / "o"))
+    xr.testing.assert_equal(found.drop_attrs(), known.drop_attrs())
 
 
 GROWING = """
@@ -125,6 +179,19 @@ def growing():
                               "solver.end_time": 30.0},
     )
 """
+
+
+def test_the_listing_of_the_docs_works_where_processes_begin_anew(tmp_path: Path) -> None:
+    """They read the script once more: on Python 3.14, and below MPI."""
+    page = (Path(__file__).parents[2] / "docs/howto/cluster.md").read_text(encoding="utf-8")
+    (listing,) = [x for x in re.findall(r"```python\n(.*?)```", page, re.S) if "Process" in x]
+    campaigns = Path(__file__).parents[2] / "campaigns"
+    own = "import multiprocessing\nmultiprocessing.set_start_method('forkserver', force=True)\n"
+    text = listing.replace('"campaigns/', f'"{campaigns}/').replace('toml")', 'toml", samples=2)')
+    text = text.replace("executor=pool)", 'executor=pool, out="o")')
+    done = in_a_script(own + text, tmp_path, sys.executable)
+    assert done.returncode == 0, done.stderr
+    assert (ringsim.open_campaign(tmp_path / "o")["status"] == 0).all()
 
 
 def test_a_design_that_grows_goes_on_from_level_to_level_on_a_dask_cluster(

@@ -100,6 +100,10 @@ def samples(file: File, said: re.Match[str]) -> None:
     if said["names"]:
         assert {len(file.of(name)) for name in names} == {int(said["count"])}
     assert int(said["of"]) == int((file.ok | file.lost).sum())
+    valued = file.ok & np.isfinite(file.values[names[0]])
+    outcomes = file.values["outcome"]
+    short_of = int((valued & np.isin(outcomes, [2, 3, 5, 6, 8, 9])).sum())  # short of the goal
+    assert int(said["short"] or 0) == short_of
     if said["bar"]:
         bars = np.where(file.ok, file.values["peak_tension_error"], np.nan)
         assert int(said["bars"]) == int(np.isfinite(bars).sum())
@@ -187,7 +191,8 @@ KNOWN = {
     r"(?P<verdict>[a-z ]+); share that meets it: (?P<bound>.+)": requirement,
     r"(?P<name>\w+): (?P<bad>\d+) of (?P<of>\d+) samples violate it(?:, (?P<lost>\d+) failed)?"
     r"(?:; \d+ more without a violation would prove it)?": violating,
-    r"(?:(?P<names>[\w, ]+): )?(?P<count>\d+) of (?P<of>\d+) samples(?:; largest of (?P<bars>\d+) "
+    r"(?:(?P<names>[\w, ]+): )?(?P<count>\d+) of (?P<of>\d+) samples"
+    r"(?:, (?P<short>\d+) of them as they ended, not deployed)?(?:; largest of (?P<bars>\d+) "
     rf"error bars: (?P<bar>{N}) N \(sample (?P<sample>\d+)\))?": samples,
     rf"in sample (?P<sample>\d+) it is least at (?P<angle>{N}) deg, (?P<time>{N}) s": place,
     r"below 0 in (?P<count>\d+) of (?P<of>\d+) samples(?P<not>: NOT enough)?": short,
