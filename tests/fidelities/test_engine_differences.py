@@ -110,7 +110,7 @@ def test_the_last_line_says_whether_bars_cover_the_differences() -> None:
         asynchrony_max=none, asynchrony_max_checked=none,
     )  # fmt: skip
     assert check_lines(two)[-1] == (
-        "in the 1 output that have them the engines differ by no more than their error bars"
+        "the engines differ by no more than their error bars in the 1 output with such bars"
     )
     # Sections that are all alike run apart by round-off, which no bar covers.
     alike = campaign(
