@@ -272,11 +272,12 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
     if "given_data_index" in analysis:
         within = places_in(analysis)
         words = any(is_word(str(name), within) for name in analysis["input"].values)
-        told = "; each word of an input counts by itself, so that these may add up to more than 1"
+        told = ", and so is each word of an input" * words
         return [
             "first-order index: share of the variance that one input alone explains, estimated "
             "from bins of its values and corrected for chance, so that one of about 0 may be below "
-            "zero; too small if the output is strongly nonlinear within a bin" + told * words
+            "zero; too small if the output is strongly nonlinear within a bin; each is estimated by "
+            f"itself{told}, so that they may add up to more than 1"
         ]
     return []
 
