@@ -117,6 +117,12 @@ def known(path: str, others: list[str]) -> list[Found]:
     ends = list(dict.fromkeys(one for one in every if one.endswith(f".{plain}")))
     if len(ends) == 1:
         return find(ends[0])
+    kind = [
+        each for root in ROOTS for model, where in places(root).items() for each in where
+        if "kind" in model.model_fields and model.model_fields["kind"].default == path
+    ]  # fmt: skip
+    if kind:
+        return find(min(kind, key=len))
     # Words of meanings before words that look alike: an aperture is no temperature.  One letter is
     # in every meaning.
     near = ends[:2] or (_told_of(plain)[:3] if len(plain) > 2 else [])

@@ -148,6 +148,15 @@ def test_the_end_of_a_path_that_is_the_only_one_is_enough() -> None:
     assert found.output.startswith("structure.half_bar (scene file")
 
 
+@for_each(
+    ("kind", "path"),
+    [("lognormal", "inputs"), ("jammed-pulley", "faults"), ("capstan", "cables.upper.friction")],
+)
+def test_a_kind_leads_to_where_it_is_chosen(kind: str, path: str) -> None:
+    assert explain(kind).startswith(f"{path} (")
+    assert f'kind = "{kind}"' in explain(kind)
+
+
 def test_paths_are_those_of_files() -> None:
     assert "cables.lower.far_winch.winding.speed" in paths("scene")
     assert "faults[k].time" in paths("scene")
