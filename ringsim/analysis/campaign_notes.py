@@ -40,6 +40,7 @@ from ringsim.analysis.intervals import (
     used,
     worst_sample,
 )
+from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
@@ -389,13 +390,21 @@ def uncertain_latches(campaign: xr.Dataset) -> Array:
 
 
 def bars_of(campaign: xr.Dataset, name: str) -> tuple[Array, float]:
-    """The error bar of an output in each sample, and the root mean square of all that are known,
-    which samples without one take; NaN if there is none.
+    """The error bar of an output in each sample; those without one take the root mean square of
+    those that ended alike, or of all where none has, and what they take in the median.  NaN if
+    there is none.
     """
     bars = np.where(good(campaign), numbers(campaign, f"{name}_error"), np.nan)
     known = np.isfinite(bars)
-    error = float(np.sqrt(np.mean(bars[known] ** 2))) if known.any() else np.nan
-    return np.where(known, bars, error), error
+    if not known.any():
+        return bars, np.nan
+    found = np.where(known, bars, np.sqrt(np.mean(bars[known] ** 2)))
+    ends = campaign[OUTCOME].to_numpy() if OUTCOME in campaign else np.zeros(len(bars))
+    for end in np.unique(ends[known]):  # a ring that stalls has other errors than one that opens
+        alike = ends == end
+        found[alike & ~known] = np.sqrt(np.mean(bars[alike & known] ** 2))
+    rest = good(campaign) & ~known
+    return found, float(np.median(found[rest] if rest.any() else found[known]))
 
 
 def slow_latches(campaign: xr.Dataset) -> Array:

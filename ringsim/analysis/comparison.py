@@ -379,7 +379,8 @@ def settings(both: Both) -> dict[str, Any]:
     names = np.array(other + apart, dtype=object)
     found: dict[str, Any] = {"setting": ("setting", names)}
     for side, scene, words in zip(SIDES, scenes, asked, strict=True):
-        told = [words.get(name, "none") for name in other]
+        fixed = {f"input {path}": f"{show(value)}, not drawn" for path, value in scene.items()}
+        told = [words.get(name, fixed.get(name, "none")) for name in other]
         told += [show(scene[path]) if path in scene else "none" for path in apart]
         about_it = {"long_name": f"value in the {side}"}
         found[f"setting_{side}"] = "setting", np.array(told, dtype=object), about_it

@@ -167,11 +167,11 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
 
 
 def _other_verdicts(found: xr.Dataset) -> Iterator[str]:
-    """The requirements whose verdict is another one in the second."""
+    """The requirements whose verdict is another one in the second, however sure either is."""
     for text in found["requirement"].values if "kept_verdict_text" in found else ():
         first, second = found["kept_verdict_text"].sel(requirement=text).values.tolist()
         mark = DOUBT if text.split()[0] in doubtful(found) else ""
-        if first != second:
+        if np.ptp(found["kept_verdict"].sel(requirement=text).values):
             yield f"{text}{mark}: {first} -> {second}"
 
 

@@ -276,8 +276,8 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
         return [
             "first-order index: share of the variance that one input alone explains, estimated "
             "from bins of its values and corrected for chance, so that one of about 0 may be below "
-            "zero; too small if the output is strongly nonlinear within a bin; each is estimated by "
-            f"itself{told}, so that they may add up to more than 1"
+            "zero; too small if the output is strongly nonlinear within a bin; each is estimated "
+            f"by itself{told}, so that they may add up to more than 1"
         ]
     return []
 

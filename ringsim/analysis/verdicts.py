@@ -281,7 +281,8 @@ _MEANING = {
         "limit than the numerical error", "i8"),
     "samples_close": ("of these, samples closer to the limit than the numerical error", "i8"),
     "numerical_error": (
-        "root mean square of the error bars of the samples that have them, in the output's unit",
+        "error bar of a sample without one: root mean square of those that ended alike, in the "
+        "output's unit, in the median",
         "f8"),
     "verdict_may_change": ("whether those could change the verdict, were they wrong", "i1"),
     "samples_short": ("samples that meet it and ended before their goal", "i8"),
@@ -355,8 +356,8 @@ def _judged(
 
 
 def _close(campaign: xr.Dataset, name: str, wanted: Requirement) -> tuple[Mask, float]:
-    """Which samples are closer to the limit than their numerical error, and that error: the root
-    mean square of the error bars of all samples that have them, which samples without one take.
+    """Which samples are closer to the limit than their numerical error, and that of samples without
+    an error bar, see ``bars_of``.
     """
     if name == OUTCOME or f"{name}_error" not in campaign:
         return np.zeros(campaign.sizes["sample"], dtype=bool), np.nan
@@ -430,7 +431,7 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         told.append(
             f"{name}: in {counted(close, 'sample')} it is closer to the limit than its numerical "
             f"error (the sample's own error bar, or without one {error}, the root mean square of "
-            "those that have one): smaller steps, or more elements, settle it"
+            "those that ended alike): smaller steps, or more elements, settle it"
         )
     if others and name in (OUTCOME, LATCHED):
         told.append(

@@ -52,7 +52,8 @@ _ZERO = 273.15
 _NOTE_ON_UNUSUAL = (
     "unusual inputs: first those that separate the failures from the other samples, or that go "
     "with the output, then those outside the central 90 % of all samples; in brackets the "
-    "difference from the median, for temperatures the value in C"
+    "difference from the median, or how many times the median it is, for temperatures the value "
+    "in C"
 )
 
 
@@ -204,7 +205,7 @@ def _told(name: str, rows: Array, value: float, units: str) -> str:
         return f"{name} {value:.4g} K ({value - _ZERO:+.0f} C{than}{end})"
     if rows.min() > 0.0 or rows.max() < 0.0:
         ratio = value / middle
-        far = f"{100.0 * (ratio - 1.0):+.0f} %" if ratio < 3.0 else f"{ratio:.2g} times"
+        far = f"{100.0 * (ratio - 1.0):+.0f} %" if ratio < 3.0 else f"{ratio:.2g} times the median"
     else:
         far = with_unit(f"{value - middle:+.2g}", units)
     return f"{name} {with_unit(f'{value:.4g}', units)} ({far}{end})"

@@ -22,7 +22,7 @@ from ringsim.outputs.family import (
 )
 from ringsim.parts.solver import LEAST_TOLERANCE, NO_DEVIATIONS
 from ringsim.scene import Scene
-from ringsim.stepping.locks import History
+from ringsim.stepping.locks import SURE, UNKNOWN, History, may_decide
 from ringsim.tables import number_text
 
 # What the base carries, and how it turns.
@@ -156,17 +156,13 @@ def unresolved(run: Run, shocks: Mapping[str, float]) -> str:
     return told
 
 
-SURE, _AIM = 0.05, 0.03
-"""Uncertain share of a latch's rate from which on it is told, and the one that its cure aims at: it
+_AIM = 0.03
+"""Uncertain share of a latch's rate that the cure of one beyond ``SURE`` aims at: it
 goes with the tolerance, and so with the square of steps.  On frames of 6 scenes with rods of 17 ms,
 at the default tolerance, a third and a tenth of it, 25 of 27 rates that were off by more than 5 %
 were told, and 55 of the 513 others (benchmarks/latch_rates.py)."""
 _LEAST_FACTOR = 0.15
 """How much shorter steps shall be at most at once: fifty times the tolerance."""
-_UNKNOWN = 0.2
-"""Uncertain share of a rate from which on it may be several times larger: in a slow flight of rods
-of 8 m one of 0.23 was 0.050 rad/s instead of 0.155.  Rates are never so much too large, since
-joints open ever faster towards their stops."""
 _JERKED = 0.15
 """Uncertain share where another joint locked in the last two steps: the largest error found."""
 
@@ -184,7 +180,7 @@ def _uncertain_rates(run: Run) -> Iterator[TooLong]:
         if not np.isfinite(sizes).any() or (name.startswith("least") and np.isnan(sizes).any()):
             continue
         place = int(np.nanargmax(sizes))
-        if name.startswith("peak") and np.nanmax(unsure) > _UNKNOWN:
+        if name.startswith("peak") and np.nanmax(unsure) > UNKNOWN:
             place = int(np.nanargmax(unsure))
         share, lock = float(unsure.flat[place]), float(run.locks.flat[place])
         if not np.isfinite(lock):
@@ -282,9 +278,6 @@ DOUBT = " ?"
 
 UNCERTAIN = "catches is uncertain"
 """What a reason says of a latch of which steps leave uncertain whether it catches."""
-_DOUBTFUL, _SEVERAL = 2.5, 5.0
-"""Factor between a rate and the least that a latch asks for, within which a lock, or a rate whose
-share beyond ``_UNKNOWN`` is uncertain, may decide: of these one was 3.9 times as large."""
 
 
 def jerked(run: Run) -> str:
@@ -305,10 +298,7 @@ def jerked(run: Run) -> str:
     met = run.history.rates
     asked = np.broadcast_to(np.asarray(latch.min_rate, dtype=float), locks.shape)
     driven, unsure = ahead.any(axis=(-2, -1)), np.nan_to_num(run.history.unsure)
-    larger = np.where(unsure > _UNKNOWN, _SEVERAL, 1.0 + 2.0 * unsure * (unsure > SURE))
-    down = np.where(driven, _DOUBTFUL, np.minimum(larger, _DOUBTFUL))
-    up = np.where(driven, np.maximum(larger, _DOUBTFUL), larger)
-    near = (met < down * asked) & (asked < up * met)
+    near = may_decide(met, unsure, asked, driven=driven)
     late = np.argwhere(near).tolist()
     if not late:
         return ""

@@ -43,7 +43,8 @@ class CableTension(Output):
         Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
         Variable(
             "peak_tension", (), "N",
-            "largest tension of any span of any cable until all V-joints have locked",
+            "largest tension of any span of any cable until all V-joints have locked, or to the "
+            "end of a run where latches do not catch",
             error_bar=ErrorBar("largest tension", safety=1.8),
             summary=("largest tension", "10.3f"), worse="larger", largest_of="cable_tension",
         ),

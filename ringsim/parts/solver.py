@@ -49,7 +49,7 @@ class Solver(Model):
     """Residual at which Newton stops, relative to the driving forces of the scene."""
     deviation_tolerance: Annotated[float, Field(ge=_LEAST_DEVIATION, le=NO_DEVIATIONS)] = 0.02
     """Error of the joints' deviations from their mean angle, over the largest so far, to which
-    steps resolve the ring's own vibrations where ``record.stress`` asks for them; 1e6: not
+    steps follow them where ``record.stress`` asks for them; 1e6: not
     followed."""
     step_limit: Annotated[int, Field(ge=1, le=MOST_STEPS)] = 20_000
     """A run that has not ended after so many steps is given up."""
@@ -104,7 +104,8 @@ class Record(Model):
     """Spacing of the output times."""
     stress: bool = False
     """Record axial + bending stress, elastic + viscous, at the ends of every rod.  Steps then
-    resolve the ring's own vibrations (``solver.deviation_tolerance``)."""
+    follow how joints swing about their mean angle (``solver.deviation_tolerance``), which is more
+    of them; the shocks of locks take shorter ones still."""
     positions: bool = False
     """Record where corners, pins, joints and the hub are, so that drawings show what was computed;
     of 18 sections 4 kB an output time."""

@@ -17,6 +17,12 @@ PartFactor = Annotated[float, Field(gt=0.0, le=1e4), Unit("1")]
 Values = float | tuple[float, ...]
 
 
+def _kelvin(value: float, first: float, last: float) -> str:
+    """A hint where a temperature would do if it were in C."""
+    kelvin = value + 273.15
+    return f"{value:g} C are {kelvin:g} K; or " if first <= kelvin <= last else ""
+
+
 class FactorTable(Model):
     """Factors on a property at temperatures, joined by lines."""
 
@@ -44,7 +50,8 @@ class FactorTable(Model):
         if out:
             raise ValueError(
                 f"temperature.{part}.value = {out[0]:g} K must lie within {first:g} .. {last:g} K, "
-                f"for which it has factors: extend temperature.{part}.{field}.temperatures"
+                f"for which it has factors: {_kelvin(out[0], first, last)}extend "
+                f"temperature.{part}.{field}.temperatures"
             )
 
     def at(self, value: Values) -> Values:

@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +101,8 @@ class Locks(Remembering):
 
     def shorter(self, before: Instant, found: Instant, least: float) -> float | None:
         """A smaller step (s) in whose end the last V-joint of a plane locks, if a winch acts on
-        that and this step goes on for long behind it; else None.  None is below ``least`` (s).
+        that and this step goes on for long behind it; or one that leads towards a latch of which
+        this one leaves open whether it catches; else None.  None is below ``least`` (s).
         """
         step, wanted = found.time - before.time, list[float]()
         for row in self._acted_on if found.angles.max() >= math.pi else ():
@@ -116,6 +117,10 @@ class Locks(Remembering):
                 wanted.append(float(np.fmax.reduce(left)) - before.time)
         # The first of two planes leaves its step to the other.
         ending = max(min(wanted, default=step) * (1.0 + 0.5 * _LATE), least)
+        if self._latches is not None and found.angles.max() >= math.pi:
+            # Half-way to it: rates that are read nearer to the stop are surer.
+            open_ = self._latches.undecided(before, found) - before.time
+            ending = min(ending, max(0.5 * open_, least))
         return ending if step - ending > 0.5 * _LATE * step else None
 
     @property
@@ -225,6 +230,30 @@ ON_STOP = 1e-9
 """Angle past 180 deg at which a stop has hardly begun to push, rad."""
 
 
+SURE = 0.05
+"""Uncertain share of a latch's rate from which on it is told."""
+UNKNOWN = 0.2
+"""Uncertain share of a rate from which on it may be several times larger: in a slow flight of rods
+of 8 m one of 0.23 was 0.050 rad/s instead of 0.155.  Rates are never so much too large, since
+joints open ever faster towards their stops."""
+_DOUBTFUL, _SEVERAL = 2.5, 5.0
+"""Factor between a rate and the least that a latch asks for, within which a lock, or a rate whose
+share beyond ``UNKNOWN`` is uncertain, may decide: of these one was 3.9 times as large."""
+
+
+def may_decide(met: Any, unsure: Any, asked: Any, *, driven: Any) -> Any:
+    """Whether steps decide that a latch catches or does not, which asks for a rate, at rates that
+    were ``met`` (rad/s) and of which such a share is uncertain; ``driven`` is whether another joint
+    locked before in the same step.
+    """
+    larger = np.where(unsure > UNKNOWN, _SEVERAL, 1.0 + 2.0 * unsure * (unsure > SURE))
+    down = np.where(driven, _DOUBTFUL, np.minimum(larger, _DOUBTFUL))
+    up = np.where(driven, np.maximum(larger, _DOUBTFUL), larger)
+    # What is nothing may be anything where it is not known.
+    unknown = (met <= 0.0) & (unsure > UNKNOWN) & (asked > 0.0)
+    return unknown | ((met < down * asked) & (asked < up * met))
+
+
 class Meeting(NamedTuple):
     """A V-joint, (plane, section), comes to 180 deg at a time (s) and an opening rate (rad/s), of
     which such a share is uncertain.
@@ -289,11 +318,30 @@ class Latches(Remembering):
         if self._sure:
             self.caught = self.caught | (now.angles >= math.pi)
             return
+        self.meet(self._met(before, now))
+        self._past = [*self._past, before][-2:]
+
+    def _met(self, before: Instant, now: Instant) -> list[Meeting]:
+        """The arrivals of a step."""
         known = [*self._past, before, now]
-        self._past = known[-3:-1]
         times = np.array([each.time for each in known])
         angles, rates = (np.array([getattr(one, k) for one in known]) for k in ("angles", "rates"))
-        self.meet(one for one in meetings(times, angles, rates) if one.time > before.time)
+        return [one for one in meetings(times, angles, rates) if one.time > before.time]
+
+    def undecided(self, before: Instant, now: Instant) -> float:
+        """When (s) the first V-joint comes to a latch in a step which leaves open whether that
+        catches; infinite if all is clear.
+        """
+        if self._sure or not self._present:
+            return math.inf
+        met = self._met(before, now)
+        first = min((one.time for one in met), default=math.inf)
+        # Another joint that locked before in this step may have jerked it.
+        return min(
+            (time for place, time, rate, unsure in met
+             if may_decide(rate, unsure, self._least[place], driven=first < time)),
+            default=math.inf,
+        )  # fmt: skip
 
     def meet(self, met: Iterable[Meeting]) -> None:
         """Let those catch that can, of meetings in the order of their times."""
@@ -335,7 +383,11 @@ def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
         before = time - _TOGETHER * (times[step + 1] - times[step])
         lately = found[bisect_left(steps, step - 2) : bisect_right(steps, step)]
         jerked = any(when < before for _, when, _ in lately)
-        yield Meeting(place, time, *_carried(times, own, speed, step, jerked=jerked))
+        rate, unsure = _carried(times, own, speed, step, jerked=jerked)
+        # A stop only brakes: the joint came at least as fast as it goes on, and at an even
+        # acceleration as fast as it must have to be there by then.
+        fast = max(float(speed[step + 1]), -2.0 * own[step] / (time - times[step]) - speed[step])
+        yield Meeting(place, time, rate, max(unsure, 1.0 - rate / fast) if fast > 0.0 else unsure)
 
 
 _TOGETHER = 0.05

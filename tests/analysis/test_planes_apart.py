@@ -120,7 +120,8 @@ def test_worst_samples_name_motors_that_are_apart() -> None:
     one = made(lambda a, b, _: np.abs(a - b), 3, samples=100)
     far = int(np.argmax(one.asynchrony_max.to_numpy()))
     ratio = one.asynchrony_max.max().item() / one.asynchrony_max.median().item()
-    words = f"{APART} {one.asynchrony_max.max().item():.4g} rad/s ({ratio:.2g} times, the highest)"
+    apart = one.asynchrony_max.max().item()
+    words = f"{APART} {apart:.4g} rad/s ({ratio:.2g} times the median, the highest)"
     assert words in unusual(one, [far])[0]
     near = int(np.argmin(one.asynchrony_max.to_numpy()))
     assert APART not in unusual(one, [near])[0]

@@ -28,6 +28,7 @@ from ringsim.plots.campaign.frame import (
     shown_until,
 )
 from ringsim.plots.run import LEAST_SPAN
+from ringsim.tables import number_text
 
 _NEEDS = ("asynchrony", "opening_angle", "final_time", "deployment_time")
 """Asynchrony first: without a value of it there is nothing to draw."""
@@ -164,7 +165,8 @@ def _whole(
     axes.axvspan(*part, color=style.ORANGE, alpha=0.2, linewidth=0.0)
     axes.set(xlim=(0.0, float(found["time"][-1])), ylim=limits)
     low, high = part
-    axes.set_title(f"all sections; below: {low:.3g} to {high:.3g} s, enlarged", fontsize=9, pad=3)
+    words = f"all sections; below: {number_text(low)} to {number_text(high)} s, enlarged"
+    axes.set_title(words, fontsize=9, pad=3)
 
 
 def _shown(campaign: xr.Dataset, read: Courses) -> tuple[Courses, str]:

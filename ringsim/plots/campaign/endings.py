@@ -403,7 +403,7 @@ def tension(campaign: xr.Dataset) -> Figure:
     legend(figure, [grid[0]], 4)
     counted = int(np.isfinite(found.to_numpy()).any(axis=(1, 2)).sum())
     note = f"{told(campaign, counted)}.{lines_told(campaign) * bool(cases)}"
-    note += " At recorded times until all V-joints have locked."
+    note += " At recorded times until the last lock, or to the end where latches do not catch."
     head(figure, campaign, "Tension along the cables", note)
     return figure
 

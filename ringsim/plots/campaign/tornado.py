@@ -245,8 +245,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
         axes.set_ylim(-0.5 - beside, counts[number] - 0.5 + beside)
         known = np.isfinite(bars.ends).all(axis=1)
         certain, uncertain = certain or bool(known.any()), uncertain or not known.all()
-        # Without its unit, which is not that of the bars.
-        words = style.label(campaign[output], "1", 42) if output in campaign else output
+        # Without its unit, which is not that of the bars; a mark behind it has room.
+        words = style.label(campaign[output], "1", 40) if output in campaign else output
         axes.set_title(words, fontsize=9.5, color=style.INK)
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
         unit = unit_behind("", units) if bars.measure == "mean_absolute_effect" else ""
