@@ -2,7 +2,6 @@
 
 import json
 import math
-import operator
 import textwrap
 from collections import Counter
 from collections.abc import Iterator
@@ -10,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 from click.shell_completion import CompletionItem
 
 from ringsim import extensions
@@ -36,9 +34,10 @@ from ringsim.rigid.margin import (
     place_of_winch,
 )
 from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
+from ringsim.scene.checks import doubtful
 from ringsim.scene.substituted import strained, substituted
 from ringsim.tables import counted, text_table, unit_text
-from ringsim.units import Model, unit_at
+from ringsim.units import Model
 from ringsim.variables import Variable
 
 SCHEMA = "scene.schema.json"
@@ -137,7 +136,7 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
         )  # fmt: skip
         for number, line in enumerate(lines):
             click.echo(f"{'' if number else label:<{wide}}{line.replace(_TIED, ' = ')}")
-    for line in _doubtful(loaded):
+    for line in doubtful(loaded):
         click.echo(f"doubtful: {line}")
     if loaded.imports:
         from ringsim.frame.model import try_laws
@@ -147,94 +146,6 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
     outside = loaded.controller is not None and loaded.controller.outside
     how = "ringsim.steps in Python steps it" if outside else "ringsim run FILE runs it"
     click.echo(f"valid{lacking}: {how}")
-
-
-_USUAL = {
-    "joints.vjoint.coulomb": (
-        0.0, 1.0, "a pin of 10 mm with a dry friction of 0.3 has that under a load of 670 N"),
-    "joints.pivot.coulomb": (
-        0.0, 1.0, "a pin of 10 mm with a dry friction of 0.3 has that under a load of 670 N"),
-    "limits.rod_stress": (
-        1e6, 1e10, "plastics bear more than 1 MPa, and no fibre 10 GPa; files give it in Pa"),
-    "limits.tension": (1.0, 1e6, "a thread of 0.1 mm bears some 10 N; files give it in N"),
-    "rods.density": (
-        100.0, 2.5e4, "foam has 100 kg/m3 and tungsten 19,300; files give it in kg/m3"),
-    "spacecraft.mass": (1.0, 1e6, "a cubesat has 1 kg; files give it in kg"),
-    "spacecraft.centre": (-50.0, 50.0, "no spacecraft is so large; files give it in m"),
-}  # fmt: skip
-"""The least and the largest value, by path, that are not taken for a slip, and why."""
-_FASTEST = 2e3
-"""Speed of a motor without load, rad/s, above which a figure of it is taken for one in rev/min:
-19,100 of them."""
-_SOFT = 1e3
-"""Axial stiffness of a rod, N, below which a figure of it is taken for a slip: the 10 N of a rope
-make it longer by a hundredth."""
-_TOO_HEAVY = 100.0
-"""Mass of all corners over that of all rods above which a figure of it is taken for a slip."""
-
-
-def _doubtful(scene: Scene) -> Iterator[str]:
-    """Values that are possible and that nobody means, each with why: no reason to refuse a scene,
-    which may be a study of just that.
-    """
-    layout, end = layout_of(scene), scene.solver.end_time
-    shortest = min(rod.length for rod in layout.rods)
-    for plane, cable in () if scene.cables is None else scene.cables.present():
-        path = f"cables.{scene.structure.planes[plane]}"
-        radii = {f"{path}.pulley_radius": cable.pulley_radius}
-        winches = {"winch": cable.winch, "far_winch": cable.far_winch}
-        for name, winch in ((n, w) for n, w in winches.items() if w is not None):
-            if (motor := winch.winding.motor) is not None:
-                speed, limit = motor.no_load_speed, motor.current_limit
-                if speed > _FASTEST:
-                    yield (
-                        f"{path}.{name}.winding.no_load_speed = {speed:g} rad/s is above "
-                        f"{_FASTEST:g} rad/s: {speed:g} rev/min are {speed * math.tau / 60.0:.4g} "
-                        "rad/s"
-                    )
-                constant = motor.torque_constant
-                if constant and limit and (most := motor.stall_torque / constant) < limit:
-                    yield (
-                        f"{path}.{name}.winding.current_limit = {limit:g} A is above {most:.3g} A, "
-                        "what the motor takes when it stalls: it never acts"
-                    )
-                radii[f"{path}.{name}.winding.drum_radius"] = motor.drum_radius
-            for key in ("start_time", "stop_time"):
-                if (time := getattr(winch, key)) is not None and time > end:
-                    yield (
-                        f"{path}.{name}.{key} = {time:g} s is after solver.end_time = {end:g} s: "
-                        "it never happens"
-                    )
-        for where, radius in radii.items():
-            if radius > shortest:
-                yield f"{where} = {radius:g} m is larger than the shortest rod, {shortest:.4g} m"
-    for number, fault in enumerate(scene.faults, 1):
-        if fault.time > end:
-            yield (
-                f"faults[{number}].time = {fault.time:g} s is after solver.end_time = {end:g} s: "
-                "it never happens"
-            )
-    for path, (least, most, why) in _USUAL.items():
-        inner, _, last = path.rpartition(".")
-        value = getattr(operator.attrgetter(inner)(scene), last, None)
-        if value is not None:
-            low, high, unit = np.min(value), np.max(value), unit_at(scene, path)
-            if low < least:
-                yield f"{path} = {low:g} {unit} is below {least:g} {unit}: {why}"
-            if high > most:
-                yield f"{path} = {high:g} {unit} is above {most:g} {unit}: {why}"
-    softest = min(layout.rods, key=lambda rod: rod.young_modulus * rod.tube.area)
-    if (stiffness := softest.young_modulus * softest.tube.area) < _SOFT:
-        yield (
-            f"rods: the axial stiffness E A of the {softest.group} is {stiffness:.3g} N, below "
-            f"{_SOFT:g} N: a pull of 10 N makes it longer by more than 1 %"
-        )
-    masses, rods = layout.masses(), {rod.group for rod in layout.rods}
-    own = sum(mass for name, mass in masses.items() if name in rods)
-    if masses.get("hinges", 0.0) > _TOO_HEAVY * own:
-        yield (
-            f"structure.corner_mass: corners of {masses['hinges']:.4g} kg on rods of {own:.4g} kg"
-        )
 
 
 def _lacking(scene: Scene) -> str:

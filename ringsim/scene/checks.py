@@ -1,6 +1,11 @@
 """What the parts of a scene ask of each other."""
 
+import math
+import operator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ringsim.cable.control import named_winches
 from ringsim.cable.winches import why_unlimited
@@ -8,6 +13,7 @@ from ringsim.choice import kind_of
 from ringsim.layout.layout import Layout, layout_of
 from ringsim.parts.rods import LengthError
 from ringsim.scene.substituted import strained
+from ringsim.units import unit_at
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene
@@ -160,3 +166,110 @@ def _check_faults(scene: "Scene") -> None:
                     f"faults[{number}].{name} = {getattr(fault, name)} must be at most {most}: "
                     f"there is no such {name}"
                 )
+
+
+# What is possible, and nobody means.
+
+
+_USUAL = {
+    "joints.vjoint.coulomb": (
+        0.0, 1.0, "a pin of 10 mm with a dry friction of 0.3 has that under a load of 670 N"),
+    "joints.pivot.coulomb": (
+        0.0, 1.0, "a pin of 10 mm with a dry friction of 0.3 has that under a load of 670 N"),
+    "latch.min_rate": (
+        0.0, 2.0, "joints come to their latches at 0.01 to 1 rad/s; files give it in rad/s"),
+    "latch.reach": (0.2, 90.0, "a pawl falls in over some degrees; files give it in deg"),
+    "limits.rod_stress": (
+        1e6, 1e10, "plastics bear more than 1 MPa, and no fibre 10 GPa; files give it in Pa"),
+    "limits.tension": (1.0, 1e6, "a thread of 0.1 mm bears some 10 N; files give it in N"),
+    "rods.density": (
+        100.0, 2.5e4, "foam has 100 kg/m3 and tungsten 19,300; files give it in kg/m3"),
+    "spacecraft.mass": (1.0, 1e6, "a cubesat has 1 kg; files give it in kg"),
+    "spacecraft.centre": (-50.0, 50.0, "no spacecraft is so large; files give it in m"),
+}  # fmt: skip
+"""The least and the largest value, by path, that are not taken for a slip, and why."""
+_FASTEST = 2e3
+"""Speed of a motor without load, rad/s, above which a figure of it is taken for one in rev/min:
+19,100 of them."""
+_STRONGEST, _SWIFTEST = 1e4, 10.0
+"""Tension (N) and speed (m/s) of a rope that no winch of an antenna gives it."""
+_SOFT = 1e3
+"""Axial stiffness of a rod, N, below which a figure of it is taken for a slip: the 10 N of a rope
+make it longer by a hundredth."""
+_TOO_HEAVY = 100.0
+"""Mass of all corners over that of all rods above which a figure of it is taken for a slip."""
+
+
+def doubtful(scene: "Scene") -> Iterator[str]:
+    """Values that are possible and that nobody means, each with why: no reason to refuse a scene,
+    which may be a study of just that.
+    """
+    layout, end = layout_of(scene), scene.solver.end_time
+    shortest = min(rod.length for rod in layout.rods)
+    for plane, cable in () if scene.cables is None else scene.cables.present():
+        path = f"cables.{scene.structure.planes[plane]}"
+        radii = {f"{path}.pulley_radius": cable.pulley_radius}
+        winches = {"winch": cable.winch, "far_winch": cable.far_winch}
+        for name, winch in ((n, w) for n, w in winches.items() if w is not None):
+            if (motor := winch.winding.motor) is not None:
+                speed, limit = motor.no_load_speed, motor.current_limit
+                if speed > _FASTEST:
+                    yield (
+                        f"{path}.{name}.winding.no_load_speed = {speed:g} rad/s is above "
+                        f"{_FASTEST:g} rad/s: {speed:g} rev/min are {speed * math.tau / 60.0:.4g} "
+                        "rad/s"
+                    )
+                if (tension := motor.stall_tension) > _STRONGEST:
+                    yield (
+                        f"{path}.{name}.winding stalls at {tension:.3g} N of rope, above "
+                        f"{_STRONGEST:g} N: files give stall_torque in N m, of the motor's own "
+                        "shaft, and gear_ratio as its turns for one of the drum"
+                    )
+                if (rate := motor.travel * motor.fastest) > _SWIFTEST:
+                    yield (
+                        f"{path}.{name}.winding winds up to {rate:.3g} m/s, above {_SWIFTEST:g} "
+                        "m/s: gear_ratio is the motor's turns for one of the drum"
+                    )
+                constant = motor.torque_constant
+                if constant and limit and (most := motor.stall_torque / constant) < limit:
+                    yield (
+                        f"{path}.{name}.winding.current_limit = {limit:g} A is above {most:.3g} A, "
+                        "what the motor takes when it stalls: it never acts"
+                    )
+                radii[f"{path}.{name}.winding.drum_radius"] = motor.drum_radius
+            for key in ("start_time", "stop_time"):
+                if (time := getattr(winch, key)) is not None and time > end:
+                    yield (
+                        f"{path}.{name}.{key} = {time:g} s is after solver.end_time = {end:g} s: "
+                        "it never happens"
+                    )
+        for where, radius in radii.items():
+            if radius > shortest:
+                yield f"{where} = {radius:g} m is larger than the shortest rod, {shortest:.4g} m"
+    for number, fault in enumerate(scene.faults, 1):
+        if fault.time > end:
+            yield (
+                f"faults[{number}].time = {fault.time:g} s is after solver.end_time = {end:g} s: "
+                "it never happens"
+            )
+    for path, (least, most, why) in _USUAL.items():
+        inner, _, last = path.rpartition(".")
+        value = getattr(operator.attrgetter(inner)(scene), last, None)
+        if value is not None:
+            low, high, unit = np.min(value), np.max(value), unit_at(scene, path)
+            if low < least:
+                yield f"{path} = {low:g} {unit} is below {least:g} {unit}: {why}"
+            if high > most:
+                yield f"{path} = {high:g} {unit} is above {most:g} {unit}: {why}"
+    softest = min(layout.rods, key=lambda rod: rod.young_modulus * rod.tube.area)
+    if (stiffness := softest.young_modulus * softest.tube.area) < _SOFT:
+        yield (
+            f"rods: the axial stiffness E A of the {softest.group} is {stiffness:.3g} N, below "
+            f"{_SOFT:g} N: a pull of 10 N makes it longer by more than 1 %"
+        )
+    masses, rods = layout.masses(), {rod.group for rod in layout.rods}
+    own = sum(mass for name, mass in masses.items() if name in rods)
+    if masses.get("hinges", 0.0) > _TOO_HEAVY * own:
+        yield (
+            f"structure.corner_mass: corners of {masses['hinges']:.4g} kg on rods of {own:.4g} kg"
+        )

@@ -409,6 +409,9 @@ def test_refusals_of_campaigns_tell_the_cure(tmp_path: Path) -> None:
           "temperature.joint.friction": {"temperatures": [100.0, 400.0], "factors": [2.0, 1.0]}},
          "temperature.joint.value = 600 K must lie within 100 .. 400 K, for which it has factors: "
          "extend temperature.joint.friction.temperatures"),
+        ({"temperature.joint.value": 20.0,
+          "temperature.joint.friction": {"temperatures": [200.0, 400.0], "factors": [2.0, 1.0]}},
+         "20 K must lie within 200 .. 400 K, for which it has factors: 20 C are 293.15 K; or "),
         ({"offload.corners": [1, 3, 3], "boom.base": "fixed", "gravity.vector": [0, 0, -9.81]},
          "offload.corners[3] = 3 names a corner twice"),
     ],
@@ -430,6 +433,11 @@ DOUBTFUL = [
     ("record.stress=true limits.rod_stress=1.0", "limits.rod_stress = 1 Pa is below 1e+06 Pa"),
 ]
 OTHERS = [
+    # T = 6.4 N m * 100 * 0.6 / 0.02 m; v = 500 rad/s * 0.02 m / 0.001.
+    ("cables.upper.winch.winding.stall_torque=6.4", "stalls at 1.92e+04 N of rope, above 10000 N"),
+    ("cables.lower.winch.winding.gear_ratio=0.001", "winding winds up to 1e+04 m/s, above 10 m/s"),
+    ("latch.peak_torque=0.02 latch.min_rate=5.0", "latch.min_rate = 5 rad/s is above 2 rad/s"),
+    ("latch.reach=0.087", "latch.reach = 0.087 deg is below 0.2 deg"),
     ("record.stress=true limits.rod_stress=3e10", "limits.rod_stress = 3e+10 Pa is above 1e+10 Pa"),
     # E = 0.1 MPa on tubes of 10 x 9.15 mm, 12.79 mm^2.
     (
