@@ -389,20 +389,27 @@ def uncertain_latches(campaign: xr.Dataset) -> Array:
     return found
 
 
+_ENOUGH = 3
+"""Error bars of samples that ended alike from which on the others of them take these alone."""
+
+
 def bars_of(campaign: xr.Dataset, name: str) -> tuple[Array, float]:
     """The error bar of an output in each sample; those without one take the root mean square of
-    those that ended alike, or of all where none has, and what they take in the median.  NaN if
-    there is none.
+    those that ended alike (of all, if that is larger, where fewer than three have one); and what
+    they take in the median.  NaN if there is none.
     """
     bars = np.where(good(campaign), numbers(campaign, f"{name}_error"), np.nan)
     known = np.isfinite(bars)
     if not known.any():
         return bars, np.nan
-    found = np.where(known, bars, np.sqrt(np.mean(bars[known] ** 2)))
+    every = np.sqrt(np.mean(bars[known] ** 2))
+    found = np.where(known, bars, every)
     ends = campaign[OUTCOME].to_numpy() if OUTCOME in campaign else np.zeros(len(bars))
     for end in np.unique(ends[known]):  # a ring that stalls has other errors than one that opens
         alike = ends == end
-        found[alike & ~known] = np.sqrt(np.mean(bars[alike & known] ** 2))
+        own = bars[alike & known]
+        size = np.sqrt(np.mean(own**2))
+        found[alike & ~known] = size if len(own) >= _ENOUGH else max(size, every)
     rest = good(campaign) & ~known
     return found, float(np.median(found[rest] if rest.any() else found[known]))
 

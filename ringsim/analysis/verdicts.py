@@ -281,8 +281,7 @@ _MEANING = {
         "limit than the numerical error", "i8"),
     "samples_close": ("of these, samples closer to the limit than the numerical error", "i8"),
     "numerical_error": (
-        "error bar of a sample without one: root mean square of those that ended alike, in the "
-        "output's unit, in the median",
+        "error bar that samples without one take from those that ended alike, in the median",
         "f8"),
     "verdict_may_change": ("whether those could change the verdict, were they wrong", "i1"),
     "samples_short": ("samples that meet it and ended before their goal", "i8"),
@@ -304,7 +303,7 @@ def _judged(
     if name not in (OUTCOME, LATCHED):
         off = off & _near(numbers(campaign, name), wanted)
     off = used & (off | close)
-    absent = used & np.isnan(numbers(campaign, name)) if name != OUTCOME else ~used & used
+    absent = used & (np.isnan(numbers(campaign, name)) if name != OUTCOME else False)
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
     short = used & ~broken & _ended_short(campaign)
     if name in _FINAL and "deployment_time" in campaign:  # then, whatever becomes of latches
@@ -356,9 +355,7 @@ def _judged(
 
 
 def _close(campaign: xr.Dataset, name: str, wanted: Requirement) -> tuple[Mask, float]:
-    """Which samples are closer to the limit than their numerical error, and that of samples without
-    an error bar, see ``bars_of``.
-    """
+    """Which samples are closer to the limit than their numerical error, see ``bars_of``."""
     if name == OUTCOME or f"{name}_error" not in campaign:
         return np.zeros(campaign.sizes["sample"], dtype=bool), np.nan
     bars, error = bars_of(campaign, name)
@@ -371,9 +368,11 @@ and base loads that were computed again with shorter steps, none was off by more
 
 
 def _near(values: NDArray[np.float64], wanted: Requirement) -> Mask:
-    """Which values such a factor would take to the other side of a limit, or are none."""
-    low, own, high = (wanted.beyond(values * factor) > 0.0 for factor in (1.0 / _FAR, 1.0, _FAR))
-    return np.asarray(np.isnan(values) | (low != own) | (high != own))
+    """Which values are within such a factor of a limit, or across zero from it, or none."""
+    near = np.isnan(values)
+    for ratio in (values / bound if bound else 0.0 * values for _, bound in wanted.limits):
+        near |= (ratio <= 0.0) | ((ratio > 1.0 / _FAR) & (ratio < _FAR))
+    return near
 
 
 IF_HOLD = "if its numbers hold"

@@ -126,8 +126,9 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
             f"  checks         {counted(len(checked), 'sample')} with the full engine, too, "
             f"{len(open_)} to run"
         )
-        known = each if len(each) else found.seconds[np.isfinite(found.seconds)]
-        like = float(known.mean()) if len(known) else 0.0
+        cost, over = relative_cost(table, campaign.scene), np.isfinite(found.seconds)
+        known, these = (each, todo) if len(each) else (found.seconds[over], np.flatnonzero(over))
+        like = float(known.sum() / cost[these].sum()) if len(known) else 0.0
         own, told, _ = _predicted(order, table, judged, open_, check_of, runs, say, like)
         lines += [f"  cost of checks {words}" for words in told]
         each = np.concatenate([each, own])
@@ -176,7 +177,7 @@ def _predicted(
 ) -> tuple[Array, list[str], float]:
     """Time of each run (s), that in words, and bytes that a run takes in the journals; ``number``
     is that of a sample's run, ``runs`` are those that the journals hold.  Of checks ``like`` is the
-    time of a sample (s).
+    time of a sample of middling cost (s).
     """
     if not len(todo):
         return np.empty(0), [], 0.0
@@ -188,8 +189,7 @@ def _predicted(
         written = (file.stat().st_size for file in (order.folder / "journals").iterdir())
         size = sum(written) / runs
     elif like * _FULL > _SHORT:
-        # Of all samples, whose mean it is: those that are checked are mostly those with error bars.
-        per_cost, size = like * _FULL / float(cost.mean()), 0.0
+        per_cost, size = like * _FULL, 0.0
         basis = f"estimated as {_FULL:g} times a sample's: a trial would take as long"
     else:
         trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
@@ -385,7 +385,7 @@ def status_lines(campaign: Folder) -> list[str]:
             rate = workers * ended[0] / max(spent[0], 1e-9)
             beside = " (without checks)" * bool(ended[1])
             lines.append(f"  rate           {rate:.3g} samples/s{beside}")
-        about = time_left(campaign, spent / np.maximum(ended, 1), workers)
+        about = time_left(campaign, workers)
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     if left and (changed := other_build(campaign)):
         on = "; its workers go on with the build that began it" if workers else ""
@@ -404,18 +404,17 @@ def _next(campaign: Folder, left: int, growth: str) -> str:
     return f"ringsim {verb} {folder}"
 
 
-def time_left(campaign: Folder, each: NDArray[np.float64], workers: int) -> str:
-    """About how long samples, and checks by the other engine, take that are left; ``each`` are the
-    seconds of one of either that has ended, 0 where none has.
+def time_left(campaign: Folder, workers: int) -> str:
+    """About how long samples, and checks by the other engine, take that are left, by those that
+    have ended.
     """
-    cost, open_ = relative_cost(campaign.table, campaign.scene), campaign.unchecked()
-    over = np.setdiff1d(campaign.checked, open_)
+    cost, checked = relative_cost(campaign.table, campaign.scene), campaign.unchecked()
     found = campaign.survey()
-    done = np.setdiff1d(np.arange(len(cost)), found.missing)
+    judged = campaign.survey(checks=True) if len(checked) else found
+    samples, checks = len(found.missing), len(checked)
     # The longest ones, as those with error bars, run first: what is left is cheaper.
-    each = each * [_dearer(cost, found.missing, done), _dearer(cost, open_, over)]
-    samples, checks = len(found.missing), len(open_)
-    rest = [(n, seconds) for n, seconds in ((samples, each[0]), (checks, each[1])) if n]
+    each = _left(cost, found, found.missing), _left(cost, judged, checked)
+    rest = [(n, seconds) for n, seconds in zip((samples, checks), each, strict=True) if n]
     known = [(n, seconds) for n, seconds in rest if seconds]
     if not known:
         return "not known yet" if rest else "none"
@@ -428,9 +427,14 @@ def time_left(campaign: Folder, each: NDArray[np.float64], workers: int) -> str:
     return told
 
 
-def _dearer(cost: Array, some: Samples, others: Samples) -> float:
-    """Predicted cost of one of some samples over that of one of the others; 1 without either."""
-    return float(cost[some].mean() / cost[others].mean()) if len(some) and len(others) else 1.0
+def _left(cost: Array, found: Survey, missing: Samples) -> float:
+    """Seconds of one of those that are missing, by the cost of those that are over; 0 if none is
+    either.
+    """
+    done = np.isfinite(found.seconds)
+    if not len(missing) or not done.any():
+        return 0.0
+    return float(found.seconds[done].sum() / cost[done].sum() * cost[missing].mean())
 
 
 def _stopping(campaign: Folder, planned: int, end: End | None) -> list[str]:

@@ -244,9 +244,10 @@ share beyond ``UNKNOWN`` is uncertain, may decide: of these one was 3.9 times as
 def may_decide(met: Any, unsure: Any, asked: Any, *, driven: Any) -> Any:
     """Whether steps decide that a latch catches or does not, which asks for a rate, at rates that
     were ``met`` (rad/s) and of which such a share is uncertain; ``driven`` is whether another joint
-    locked before in the same step.
+    locked before in the same step, long enough for its jerk to arrive.
     """
-    larger = np.where(unsure > UNKNOWN, _SEVERAL, 1.0 + 2.0 * unsure * (unsure > SURE))
+    several = np.maximum(_SEVERAL, 1.0 / np.maximum(1.0 - unsure, 1e-9))
+    larger = np.where(unsure > UNKNOWN, several, 1.0 + 2.0 * unsure * (unsure > SURE))
     down = np.where(driven, _DOUBTFUL, np.minimum(larger, _DOUBTFUL))
     up = np.where(driven, np.maximum(larger, _DOUBTFUL), larger)
     # What is nothing may be anything where it is not known.
@@ -335,11 +336,14 @@ class Latches(Remembering):
         if self._sure or not self._present:
             return math.inf
         met = self._met(before, now)
-        first = min((one.time for one in met), default=math.inf)
+        if not met:
+            return math.inf
         # Another joint that locked before in this step may have jerked it.
+        jerked = min(one.time for one in met) + _TOGETHER * (now.time - before.time)
         return min(
             (time for place, time, rate, unsure in met
-             if may_decide(rate, unsure, self._least[place], driven=first < time)),
+             if not self.caught[place] and time < self._fails[place]
+             and may_decide(rate, unsure, self._least[place], driven=time > jerked)),
             default=math.inf,
         )  # fmt: skip
 

@@ -79,7 +79,8 @@ class OutputTable(Model):
 
     def stated(self) -> dict[str, str]:
         """Attributes of the file that its makers state."""
-        return {"license": self.license} | ({"creator_name": self.creator} if self.creator else {})
+        terms, creator = self.license.strip() or NO_LICENSE, self.creator.strip()
+        return {"license": terms} | ({"creator_name": creator} if creator else {})
 
 
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:

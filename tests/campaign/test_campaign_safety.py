@@ -227,29 +227,35 @@ def test_replay_runs_no_code_that_a_file_names(copied):
 def test_time_left_counts_samples_and_checks_apart(copied):
     """Two of ten samples are to run, of 4 s each, and two checks of 30 s, by two workers."""
     folder = open_folder(copied.folder / "out")
-    each = np.array([4.0, 30.0])
-    half = {"scene": folder.scene, "checked": np.array([0, 5])}
-    half["table"] = SimpleNamespace(columns=(), samples=10)
-    half["survey"] = lambda: SimpleNamespace(missing=np.array([8, 9]))
+    half = {"scene": folder.scene, "table": SimpleNamespace(columns=(), samples=10)}
+    samples = np.where(np.arange(10) < 8, 4.0, np.nan)
+    checks = np.where(np.isin(np.arange(10), [3, 7]), 30.0, np.nan)
+
+    def survey(*, judged: bool) -> SimpleNamespace:
+        seconds = checks if judged else samples
+        return SimpleNamespace(missing=np.flatnonzero(np.isnan(seconds)), seconds=seconds)
+
+    half["survey"] = lambda checks=False: survey(judged=checks)
     checked = SimpleNamespace(**half, unchecked=lambda: np.array([0, 5]))
     without = SimpleNamespace(**half, unchecked=lambda: np.empty(0, dtype=int))
-    assert time_left(checked, each, 2) == "about 34 s"
-    assert time_left(checked, np.array([4.0, 0.0]), 2) == (
-        "about 4 s, plus 2 checks of unknown duration"
-    )
-    assert time_left(without, each, 2) == "about 4 s"
+    assert time_left(checked, 2) == "about 34 s"
+    assert time_left(without, 2) == "about 4 s"
+    checks[:] = np.nan
+    assert time_left(checked, 2) == "about 4 s, plus 2 checks of unknown duration"
     # The last one leaves workers idle; nothing is known before one has ended.
-    assert time_left(without, np.array([100.0, 0.0]), 48) == "about 100 s"
-    assert time_left(checked, np.zeros(2), 2) == "not known yet"
-    # Two of the 18 that are over had error bars, and took three times as long or more.
-    bars = np.isin(np.arange(20), [0, 5])
+    samples[:8] = 100.0
+    assert time_left(without, 48) == "about 100 s"
+    samples[:] = np.nan
+    assert time_left(checked, 2) == "not known yet"
+    # Two of the eight that are over had error bars, and took several times as long.
+    bars = np.isin(np.arange(10), [0, 5])
     column = replace(folder.table.columns[0], path="solver.error_bars", values=bars)
-    half["table"] = replace(folder.table, columns=(column,))
+    half["table"] = SimpleNamespace(columns=(column,), samples=10)
     whole = relative_cost(half["table"], folder.scene)
-    mean = 50.0 * np.delete(whole, [8, 9]).mean()
+    samples[:8] = 50.0 * whole[:8]
     barred = SimpleNamespace(**half, unchecked=lambda: np.empty(0, dtype=int))
     assert whole[0] > 2.0 * whole[9]
-    assert time_left(barred, np.array([mean, 0.0]), 1) == f"about {100.0 * whole[9]:.0f} s"
+    assert time_left(barred, 1) == f"about {100.0 * whole[9]:.0f} s"
 
 
 @pytest.mark.slow  # a signal to one rank, test_campaign_together.py, goes the same way

@@ -135,6 +135,8 @@ def test_a_run_says_which_rates_the_lock_of_another_joint_may_have_changed(
     ("met", "unsure", "driven", "decides"),
     [
         (0.0, 1.0, False, True),  # what is not known may be anything
+        (0.001, 0.99, False, True),
+        (0.001, 0.97, False, False),
         (0.0, 0.1, False, False),
         (0.039, 0.04, False, False),
         (0.0395, 0.06, False, True),
