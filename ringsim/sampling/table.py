@@ -165,10 +165,16 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
     middle = plain(distribution.quantile(np.array([0.5]))[0])
     for path in (paths := _paths_of(name, distribution)):
         refuse_fixed(base, path)
-    if not distribution.each_section:
-        base.with_values(dict.fromkeys(paths, middle))
-        return [""]
-    counts = {path: _each_of(base, path, middle) for path in paths}
+    try:
+        if not distribution.each_section:
+            base.with_values(dict.fromkeys(paths, middle))
+            return [""]
+        counts = {path: _each_of(base, path, middle) for path in paths}
+    except InputError as error:
+        if isinstance(middle, float):  # a value that nobody has written
+            told = f"inputs: {name}: {show(middle)} is the median of what is drawn for it"
+            raise InputError(f"{told}, and {error}") from None
+        raise
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{path} has {count}" for path, count in counts.items())
         raise InputError(

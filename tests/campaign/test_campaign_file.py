@@ -116,6 +116,17 @@ def test_mistakes_are_refused_in_one_line(old, new, words, tmp_path):
     assert str(refusal.value).startswith("good.toml: ")
 
 
+@pytest.mark.quick
+def test_a_refused_median_is_told_as_what_it_is(tmp_path):
+    """A value that stands nowhere in the file; one that does needs no word."""
+    head = GOOD.partition("[set]")[0].replace("ring18", "ring18-motor")
+    speed = '[inputs]\n"cables.upper.winch.winding.speed" = '
+    with pytest.raises(InputError) as refused:
+        loaded(tmp_path, f'{head}{speed}{{ kind = "uniform", low = 380.0, high = 820.0 }}\n').draw()
+    assert "speed: 600.0 is the median of what is drawn for it, and scene" in str(refused.value)
+    assert "speed = 600.0 rad/s must be below" in str(refused.value)
+
+
 @for_each("part", ["0/2", "3/2", "2", "a/b", "-1/2", "1/0"])
 def test_senseless_parts_are_refused(part, bench):
     printed = bench.run("campaign", bench.write(2), "--part", part, code=2)
