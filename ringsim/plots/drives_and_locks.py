@@ -149,9 +149,6 @@ def motors(dataset: xr.Dataset) -> Figure:
                  curve=dataset[name].sel(peak.place))  # fmt: skip
     figure.align_ylabels(panels)
     style.time_axes(dataset, dataset["motor_torque"].max(("plane", "winch")), *panels)
-    often = np.median(np.diff(dataset["time"])) if dataset.sizes["time"] > 1 else 0.0
-    panels[-1].set_xlabel(f"{panels[-1].get_xlabel()} (curves: records every {often:.3g} s; dots: "
-                          "largest of all steps)")  # fmt: skip
     handles, words = panels[0].get_legend_handles_labels()
     figure.legend(handles, words, loc="outside lower center", ncols=len(words))
     style.head(figure, panels[0], dataset, "Motors")

@@ -148,6 +148,24 @@ def test_output_is_rounded_and_left_out_where_asked(bench):
     assert sizes[0] < sizes[1]
 
 
+def test_who_answers_for_a_file_and_who_made_it_stand_in_it(bench):
+    """A licence "None", as ACDD has it, and no creator where nobody states them."""
+    stated = '[output]\nlicense = "CC-BY-4.0"\ncreator = "Antenna team"\n'
+    file = bench.write(4, more=stated)
+    for part in (1, 2):
+        bench.run("campaign", file, "--part", f"{part}/2", "--out", "out")
+    found = bench.result("out").attrs
+    assert (found["license"], found["creator_name"]) == ("CC-BY-4.0", "Antenna team")
+    assert found["execution"] == "1 local worker in each of 2 parts"
+    bench.run("merge", "out")
+    assert bench.result("out").attrs["execution"] == "merged on its own, from 2 journals"
+    blank = bench.write(2, more='[output]\nlicense = " "\ncreator = ""\n', name="blank.toml")
+    bench.run("campaign", blank, "--workers", 0, "--out", "blank")
+    found = bench.result("blank").attrs
+    assert found["license"] == "None"
+    assert "creator_name" not in found
+
+
 def test_dry_run_tells_the_plan_and_keeps_nothing(bench):
     printed = bench.run("campaign", bench.write(16), "--workers", 2, "--dry-run", "--out", "out")
     assert "16 to run" in printed
