@@ -390,7 +390,9 @@ def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
         rate, unsure = _carried(times, own, speed, step, jerked=jerked)
         # A stop only brakes: the joint came at least as fast as it goes on, and at an even
         # acceleration as fast as it must have to be there by then.
-        fast = max(float(speed[step + 1]), -2.0 * own[step] / (time - times[step]) - speed[step])
+        fast, way = float(speed[step + 1]), time - float(times[step])
+        if way > 0.0:  # a joint may be there within rounding
+            fast = max(fast, -2.0 * float(own[step]) / way - float(speed[step]))
         yield Meeting(place, time, rate, max(unsure, 1.0 - rate / fast) if fast > 0.0 else unsure)
 
 

@@ -66,6 +66,21 @@ def test_where_the_acceleration_grows_the_uncertain_share_holds_the_rate() -> No
 
 
 @pytest.mark.quick
+def test_a_rate_below_what_the_joint_does_next_is_uncertain() -> None:
+    """Upper joint 3 of a ring of 8 m on the ground: carried on it has 0.022 rad/s, with finer steps
+    0.091, and it is 0.062 rad/s fast on its stop; one that stands at its stop but for rounding has
+    no way left.
+    """
+    times, past = [1024.4403, 1025.7411, 1026.1378, 1026.7193], [-0.05737, -0.03223, -0.02409, 7e-5]
+    found = meeting(times, past, [0.01847, 0.02029, 0.02071, 0.06198])
+    assert found.rate == pytest.approx(0.022, rel=0.02)
+    assert found.rate / (1.0 - found.unsure) >= 0.062 * 0.999
+    slow = meeting([0.0, 1.0, 2.0, 3.0], [-0.2, -0.1, -1e-300, 1e-4], [0.1, 0.1, 0.1, 0.01])
+    assert slow.rate == pytest.approx(0.1)
+    assert slow.unsure < 0.01
+
+
+@pytest.mark.quick
 def test_a_joint_jerked_by_the_lock_of_another_goes_on_with_the_smaller_acceleration() -> None:
     times, speeds = np.array([0.0, 0.1, 0.2, 0.3]), np.array([0.1, 0.12, 0.2, 0.01])
     past = np.array([-0.05, -0.04, -0.02, 1e-4])
