@@ -8,7 +8,6 @@ import numpy as np
 
 from ringsim.cable.friction import LEAST_TENSION, Friction, Pulleys
 from ringsim.cable.ropes import CHAIN_PARTS, Array, Flags, Ropes
-from ringsim.cable.winding import WinchReading
 
 # The chain at one instant: tensions, forces, powers.
 
@@ -132,33 +131,6 @@ class ChainState:
     def elastic_energy(self) -> Array:
         """Elastic energy of each rope, in J, shape (ropes,)."""
         return self.energy_density * self.natural
-
-    def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
-        """Readings of the winch at an end (0 first, 1 far) of a cable (from 0)."""
-        ropes = self.ropes
-        rope = int(ropes.of_end[cable, end])
-        present = float(self.wound_rate[cable, end])
-        inner = ropes.inner(rope)
-        part = self.lengths[ropes.starts[rope] : ropes.ends[rope]] / self.paths[rope]
-        slip, decays = self.slip_speeds[inner], self.log_decays[inner]
-        moves, seen, friction = self.friction.moves, self.pulleys, self.friction
-        share = (1.0 - np.cumsum(part)[:-1] - float(end)) / slip
-        slid = self.speeds[inner] / slip - present * share
-        alive, logs, place = float(ropes.alive[rope]), np.zeros(len(part)), -1 if end else 0
-        behind = logs[1:]
-
-        def ratio(speed: float) -> float:
-            # A root finder asks some ten thousand times a run: few calls of numpy, in place.
-            turning, own = slid + speed * share, decays
-            if moves:
-                seen.speed[inner] = np.abs(turning) * slip
-                own = friction.decays(seen)[inner]
-            np.add.accumulate(own * np.tanh(turning), out=behind)
-            weights = np.exp(logs - np.maximum.reduce(logs))
-            return alive * float(weights[place]) / float(weights @ part)
-
-        path_rate = float(self.path_rates[rope] + self.wound_rates[rope]) - present
-        return WinchReading(tension_ratio=ratio, path_rate=path_rate, path_slope=path_slope)
 
 
 def pulley_tensions(ropes: Ropes, tensions: Array) -> Array:

@@ -1,6 +1,7 @@
 """Records of the cables of a scene: sheaves, places, brackets, winches."""
 
 import difflib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,7 +15,7 @@ from ringsim.cable import friction as regularisation
 from ringsim.cable.friction import Frictionless, PulleyFriction
 from ringsim.cable.ropes import Array
 from ringsim.cable.winding import FeedbackWinding, PrescribedWinding, StallWinding, Winding
-from ringsim.choice import OneOf
+from ringsim.choice import OneOf, kind_of
 from ringsim.units import (
     AxialStiffness,
     Metre,
@@ -455,3 +456,19 @@ class BlockSheave:
 
 
 Sheave = FixedSheave | BlockSheave
+
+
+# Whether a drive has a limit, without which it has no margin.
+
+
+def why_unlimited(cables: Cables | None, planes: tuple[str, ...]) -> str:
+    """Which winch pulls with any force, and the cure; empty if none does."""
+    for plane, cable in [] if cables is None else cables.present():
+        for end, winch in zip(("winch", "far_winch"), cable.winches, strict=False):
+            if not math.isfinite(winch.winding.available_tension()):
+                return (
+                    f'cables.{planes[plane]}.{end}.winding.kind = "{kind_of(winch.winding)}": '
+                    "its force is not limited, so that no drive margin can be calculated (choose "
+                    'kind = "motor" or "stall", or leave margin out)'
+                )
+    return ""

@@ -1,10 +1,8 @@
 """Winding laws: how much rope a winch has taken up, and how fast."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -32,13 +30,9 @@ from ringsim.units import (
 # The family of winding laws: how much rope a winch has taken up, and how fast.
 
 
-@dataclass(frozen=True)
-class WinchReading:
-    """Readings of a winch at the beginning of a step."""
+class WinchReading(NamedTuple):
+    """Readings of a winch at the end of a step that is tried."""
 
-    tension_ratio: Callable[[float], float]
-    """Tension at the winch over the mean tension of the rope as a function of the winch's
-    speed (m/s), not falling; 1 without friction."""
     path_rate: float
     """Rate of the path length and of another winch on the same rope, in m/s: negative while
     the structure gives rope free."""
@@ -117,7 +111,7 @@ class FeedbackWinding(Winding):
     """A law whose speed depends on the tension, solved within the step.
 
     The rope is so stiff that a speed chosen from the present tension would overshoot within one
-    step: the law uses the tension at the end of the step, see ``ringsim.cable.winches``.
+    step: the law uses the tension at the end of the step, see ``ringsim.core.winches``.
     """
 
     def command(self, tension: float, reading: WinchReading) -> float:

@@ -10,6 +10,7 @@ import hashlib
 import math
 import platform
 import struct
+from collections.abc import Callable
 from functools import cache
 from importlib.metadata import distributions
 from pathlib import Path
@@ -66,6 +67,10 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "spread_changes": ("ttaaa", _NONE),
     "find_slopes": ("tt", _WHOLE),
     "limit_of_ropes": ("w", _REAL),
+    "answer_ropes": ("tf", _WHOLE),
+    "turn_winches": ("ttf", _WHOLE),
+    "find_left": ("ttfa", _WHOLE),
+    "ratio_of_winch": ("ttfwr", _REAL),
 }
 """What each takes: tables (t), arrays of real (a) and whole numbers (n), such numbers (r, w) and
 functions (f); and what it returns.
@@ -78,6 +83,26 @@ _KINDS = {NDArray[np.float64]: "a", NDArray[np.int64]: "n", float: "r", int: "w"
 """The same of fields of tables, by their annotations."""
 MOST_KNOWN = 64
 """Packed tables that are kept at most."""
+
+
+def ask(answer: Callable[[int], None], called: Callable[[Any], int]) -> int:
+    """Call a function of the core with what it may ask; what ``called`` with that returns.
+
+    What ``answer`` raises goes on behind it: nothing may be raised into C, which stops instead.
+    """
+    raised: list[BaseException] = []
+
+    def attempt(what: int) -> int:
+        try:
+            answer(what)
+        except BaseException as error:
+            raised.append(error)
+        return len(raised)
+
+    found = called(ASKED(attempt))
+    if raised:
+        raise raised[0]
+    return found
 
 
 @cache

@@ -9,9 +9,9 @@ import numpy as np
 from ringsim.cable.chain import ChainState
 from ringsim.cable.records import Cables
 from ringsim.cable.ropes import Ropes
-from ringsim.cable.winches import Winches
 from ringsim.core.chain import Chain, Turning
 from ringsim.core.tension import PASSING
+from ringsim.core.winches import Winches
 from ringsim.exudyn.assembly import Array, Assembly, Indices
 from ringsim.exudyn.cable_path import CablePath, Placed
 
@@ -231,7 +231,7 @@ class CableDrive:
         path = path_rate = None
         if self.winches.answering:
             path, path_rate = self.chain.paths(ropes, placed.points, placed.velocities)
-        wound, wound_rate = self.winches.at(time, ropes, path, path_rate)
+        wound, wound_rate = self.winches.at(time, path, path_rate)
         state = self.chain.state(ropes, placed.points, placed.velocities, wound, wound_rate)
         return state, placed
 
@@ -292,7 +292,7 @@ class CableDrive:
                 state, placed = self._answer(q, q_t, t)
                 left: Array | float = 1.0
                 if self.winches.answering:
-                    left = self.winches.stiffness_left(t, self.ropes, state.paths, state.path_rates)
+                    left = self.winches.stiffness_left(t, state.paths, state.path_rates)
                 slip, own = state.slip_speeds, state.exponent_slopes
                 slopes = self._turning.slopes(
                     self.ropes, state.speeds, own, lambda speed: np.tanh(speed / slip)

@@ -17,10 +17,10 @@ from ringsim.cable.friction import (
 )
 from ringsim.cable.records import BlockSheave, Cables, Sheave
 from ringsim.cable.ropes import SHORTEST, Ropes
-from ringsim.cable.winches import Winches
 from ringsim.core.chain import Chain, Seen
 from ringsim.core.library import call
 from ringsim.core.tension import Drums, RopeTable, Spans
+from ringsim.core.winches import Answering, Winches
 from ringsim.frame.elimination import Border
 from ringsim.frame.laws import Tape, taped
 from ringsim.frame.mesh import Indices, Mesh, Parts, Skeleton
@@ -133,6 +133,7 @@ class Roped(NamedTuple):
 
     ropes: RopeTable
     behind: Indices
+    winches: Answering
     drums: Drums
     spans: Spans
     seen: Seen
@@ -145,13 +146,20 @@ class Roped(NamedTuple):
 
     @classmethod
     def of(
-        cls, ropes: Ropes, table: RopeTable, points: int, unknowns: int, *, hub: bool
+        cls,
+        ropes: Ropes,
+        table: RopeTable,
+        winches: Answering,
+        points: int,
+        unknowns: int,
+        *,
+        hub: bool,
     ) -> "Roped":
         """Not yet measured, on so many unknowns."""
         pulleys, spans, count = len(ropes.behind), ropes.spans, len(table.starts)
         most = call("factors_needed", table, np.ones(pulleys))
         return cls(
-            table, ropes.behind, Drums.still(count), Spans.empty(ropes),
+            table, ropes.behind, winches, Drums.still(count), Spans.empty(ropes),
             Seen.empty(pulleys), np.zeros(pulleys), np.ones(count), np.zeros((most, spans)),
             np.zeros((most, spans, 3)), np.zeros((2, most, points, 3)),
             Border.empty(unknowns, most, hub),
@@ -219,7 +227,8 @@ class FrameCables:
         self.turn(time)
         if self.winches.answering:
             call("measure", self.roped.ropes, self.roped.behind, places, rates, self.roped.spans)
-            self.answer(time)
+            self.winches.answer_in(lambda function: call("answer_ropes", self.roped, function))
+            self._turned = _Turned(*self.roped.winches.turned.copy())
         return self._tightened(places, rates)
 
     def _tightened(self, places: Array, rates: Array) -> ChainState:
@@ -260,6 +269,9 @@ class FrameCables:
         self.roped.seen.forget()
         self._turned_at = math.nan
         self.winches.advance(time, state, slopes)
+        winches = self.winches.table(self.ropes)
+        if winches is not self.roped.winches:  # behind a fault
+            self.roped = self.roped._replace(winches=winches)
 
     def refuse(self, places: Array, rates: Array) -> None:
         """ValueError, with what is wrong, where the chain has no answer."""
@@ -269,22 +281,14 @@ class FrameCables:
         """Let winches turn up to a time (s) that do not answer to their ropes: alike in all
         iterations of a step.
         """
-        if time != self._turned_at and not self.winches.answering:
-            self._wind(*self.winches.at(time, self.ropes, None, None))
-            self._turned_at = time
+        if time == self._turned_at:
+            return
+        self._turned_at = time
+        if self.winches.answering:
+            self.winches.hold(time)
+        else:
+            self._wind(*self.winches.at(time))
             self.roped.left[:] = 1.0
-
-    def answer(self, time: float) -> None:
-        """Let winches turn that answer to their ropes, whose spans are measured."""
-        self._wind(*self.winches.at(time, self.ropes, *self._paths()))
-
-    def find_left(self, time: float) -> None:
-        """Find which share of a change of path stretches each rope, whose winches answer."""
-        self.roped.left[:] = self.winches.stiffness_left(time, self.ropes, *self._paths())
-
-    def _paths(self) -> tuple[Array, Array]:
-        spans = self.roped.spans
-        return self.ropes.along(spans.length), self.ropes.along(spans.rate)
 
     def _wind(self, wound: Array, rate: Array) -> None:
         """Let the winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
@@ -293,7 +297,10 @@ class FrameCables:
 
     def _retable(self) -> None:
         table = self.chain.table(self.ropes, self.path_points.span)
-        self.roped = Roped.of(self.ropes, table, self.points, self._unknowns, hub=self._hub)
+        winches = self.winches.table(self.ropes)
+        self.roped = Roped.of(
+            self.ropes, table, winches, self.points, self._unknowns, hub=self._hub
+        )
         self._turned_at = math.nan
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.core.chain import Seen
-from ringsim.core.library import ASKED, NOT_ASKED, call, empty_of
+from ringsim.core.library import NOT_ASKED, ask, call, empty_of
+from ringsim.core.winches import LAWS
 from ringsim.frame.cables import Arms, FrameCables, PathPoints, PulleyLaws, Roped
 from ringsim.frame.elimination import Border, Fronts
 from ringsim.frame.laws import Acting, JointLaws, Openings
@@ -39,7 +40,7 @@ from ringsim.scene import Scene
 
 # What newton.c asks for, and how it ends.
 _WINCHES, _PARTS = 1, 2
-_WIND, _FORCES, _ANSWER, _SLOPES = range(4)
+_FORCES, _SLOPES = range(2)
 _BALANCED, _UNBALANCED, _ENDLESS, _SMALL_PIVOT, _NO_TENSIONS, _RAISED = range(6)
 
 
@@ -287,28 +288,20 @@ class FrameModel:
         inner, fronts = self.system.g[: self.mesh.unknowns], self.system.fronts.whole
         by_rate = self.coefficients.rate_by_place(step)
         by_place = self.coefficients.acceleration_by_place(step)
-        raised: list[BaseException] = []
 
-        def answer(what: int) -> int:
-            # Nothing may be raised into C: it stops, and what was raised goes on behind it.
-            try:
-                if what == _WIND and cables is not None:
-                    cables.answer(time)
-                elif what == _ANSWER and cables is not None:
-                    cables.find_left(time)
-                for other in others:
-                    if what == _FORCES:
-                        other.push(now, inner)
-                    elif what == _SLOPES:
-                        other.add_tangent(now, by_rate, by_place, fronts)
-            except BaseException as error:
-                raised.append(error)
-            return len(raised)
+        def answer(what: int) -> None:
+            if what >= LAWS and cables is not None:
+                cables.winches.answer(what - LAWS)
+                return
+            for other in others:
+                if what == _FORCES:
+                    other.push(now, inner)
+                elif what == _SLOPES:
+                    other.add_tangent(now, by_rate, by_place, fronts)
 
-        how = int(call(name, self.system, roped, asks, ASKED(answer), step, *given))
-        if raised:
-            raise raised[0]
-        return how
+        return ask(
+            answer, lambda function: call(name, self.system, roped, asks, function, step, *given)
+        )
 
     def _place(self, state: State) -> None:
         """Places of all followed coordinates at the state's pose."""

@@ -15,9 +15,8 @@ from ringsim.cable.friction import (
     PulleyFriction,
     Pulleys,
 )
-from ringsim.cable.records import Cable, Winch
+from ringsim.cable.records import Cable, Winch, why_unlimited
 from ringsim.cable.ropes import Ropes
-from ringsim.cable.winches import why_unlimited
 from ringsim.layout.bodies import Array
 from ringsim.parts.faults import AT_ONCE, Fault, Struck
 from ringsim.parts.laws import AngleLaw, Switches

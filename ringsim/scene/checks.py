@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ringsim.cable.control import named_winches
-from ringsim.cable.winches import why_unlimited
+from ringsim.cable.records import why_unlimited
 from ringsim.choice import kind_of
 from ringsim.layout.layout import Layout, layout_of
 from ringsim.parts.rods import LengthError

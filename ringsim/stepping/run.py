@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ringsim.cable.chain import ChainState
     from ringsim.cable.records import Cable
     from ringsim.cable.ropes import Ropes
-    from ringsim.cable.winches import Winches
+    from ringsim.core.winches import Winches
     from ringsim.outputs.recorder import Recorder
     from ringsim.parts.laws import Switches
     from ringsim.scene import Scene

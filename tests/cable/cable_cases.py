@@ -13,9 +13,9 @@ from ringsim.cable.friction import (
     Frictionless,
 )
 from ringsim.cable.records import Cable, Winch
-from ringsim.cable.winches import Winches
 from ringsim.cable.winding import ConstantWinding
 from ringsim.core.chain import Chain
+from ringsim.core.winches import Winches
 
 RADIUS = 0.01
 LAWS = {
@@ -124,7 +124,7 @@ def wind(law, stiffness, step, steps, path_speed=lambda time: 0.0, friction=LAWS
         rate = path_speed(k * step)
         path = np.array([2.0 + case.points[3, 0] - 1.0])
         case.velocities[3, 0] = rate
-        case.wound, case.wound_rate = winches.at(k * step, case.ropes, path, np.array([rate]))
+        case.wound, case.wound_rate = winches.at(k * step, path, np.array([rate]))
         now = case.state()
         winches.advance(k * step, now, np.zeros(1))
         tensions.append(now.winch_tensions[0, 0])

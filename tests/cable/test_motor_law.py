@@ -11,8 +11,8 @@ from pydantic import ValidationError
 
 from cable_cases import still
 from ringsim.cable.records import Winch
-from ringsim.cable.winches import Winches
 from ringsim.cable.winding import MotorWinding, RampWinding, StallWinding
+from ringsim.core.winches import Winches
 
 pytestmark = pytest.mark.quick
 
@@ -128,7 +128,7 @@ def pulled(law, rate, steps=200, step=0.02):
     case.velocities[1, 0] = -rate
     for k in range(steps):
         path, moving = np.array([case.points[1, 0]]), np.array([-rate])
-        case.wound, case.wound_rate = winches.at(k * step, case.ropes, path, moving)
+        case.wound, case.wound_rate = winches.at(k * step, path, moving)
         now = case.state()
         winches.advance(k * step, now, np.zeros(1))
         case.points[1, 0] -= step * rate

@@ -123,7 +123,7 @@ class Bench:
         """The same for given velocities of the points, (nodes * 7,)."""
         path, drive = self.drive.path, self.drive
         placed = path.place(place, np.zeros_like(place))
-        wound, rate = drive.winches.at(time, drive.ropes, None, None)
+        wound, rate = drive.winches.at(time)
         state = drive.chain.state(drive.ropes, placed.points, velocities, wound, rate)
         return path.in_a_row(path.generalised(placed, state.point_forces))
 

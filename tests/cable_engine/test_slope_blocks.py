@@ -127,7 +127,7 @@ def test_the_jacobian_is_the_derivative_of_the_forces() -> None:
         """With the velocities of the points fixed, or with those that follow from rates."""
         placed = path.place(moved, rates if moving is None else moving)
         velocities = fixed if moving is None else placed.velocities
-        wound_rate = own.winches.at(0.0, own.ropes, None, None)[1]
+        wound_rate = own.winches.at(0.0)[1]
         state = own.chain.state(own.ropes, placed.points, velocities, at_rest, wound_rate)
         return path.in_a_row(path.generalised(placed, state.point_forces))
 

@@ -19,6 +19,7 @@ from ringsim.core import library
 from ringsim.core.chain import Seen
 from ringsim.core.library import call
 from ringsim.core.tension import Drums, RopeTable, Spans
+from ringsim.core.winches import Answering
 from ringsim.frame import elimination
 from ringsim.frame.cables import Arms, PathPoints, PulleyLaws, Roped
 from ringsim.frame.elimination import Border, Fronts
@@ -58,7 +59,7 @@ def test_arrays_that_are_not_whole_or_of_other_numbers_are_refused() -> None:
 def test_tables_are_as_large_here_as_in_c_and_so_are_constants() -> None:
     tables = (
         Mesh, Pose, Strains, Fronts, Border, Tape, Acting, Web, Coefficients, Followed, Moving,
-        Held, PathPoints, Arms, PulleyLaws, RopeTable, Drums, Spans, Seen, Roped, System,
+        Held, PathPoints, Arms, PulleyLaws, RopeTable, Drums, Spans, Seen, Answering, Roped, System,
     )  # fmt: skip
     sizes = {kind.__name__: library.words_of(kind) for kind in tables}
     assert sizes == {k.__name__: call("words_of_table", n) for n, k in enumerate(tables)}

@@ -104,16 +104,16 @@ def test_what_python_raises_below_the_core_arrives(
     scene = of_cables(CABLES["motor"] | {"solver.end_time": 0.1})
     model = FrameModel(scene)
     run = Integration(model)
-    own, asked = model.cables.answer, 0
+    own, asked = model.cables.winches.answer, 0
 
-    def refuse(time: float) -> None:
+    def refuse(what: int) -> None:
         nonlocal asked
         asked += 1
         if asked > 20:
             raise error
-        own(time)
+        own(what)
 
-    monkeypatch.setattr(model.cables, "answer", refuse)
+    monkeypatch.setattr(model.cables.winches, "answer", refuse)
     if isinstance(error, KeyboardInterrupt):
         with pytest.raises(KeyboardInterrupt):
             run.run()

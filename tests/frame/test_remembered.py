@@ -17,8 +17,8 @@ import pytest
 from pydantic import BaseModel
 
 from law_scenes import STOPS, of_cables, of_forces
-from ringsim.cable.winches import Winches
 from ringsim.core.chain import Seen
+from ringsim.core.winches import Winches
 from ringsim.dataset import save
 from ringsim.frame.integrate import Storing
 from ringsim.frame.model import FrameModel

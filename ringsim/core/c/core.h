@@ -220,10 +220,19 @@ typedef struct {
     Reals length, rate, unit, angle, tension, share, exponent, speed;
 } Spans;
 
+/* ringsim.core.winches */
+typedef struct {
+    Ints on;
+    I moves;
+    Reals held, turned, paths, elapsed, began, past, balance, asked, limits, speeds, slopes, since, found,
+        lengths, sliding, decays, seen, logs, told;
+} Answering;
+
 /* ringsim.frame.cables.Roped */
 typedef struct {
     RopeTable ropes;
     Ints behind;
+    Answering winches;
     Drums drums;
     Spans spans;
     Seen seen;
@@ -246,6 +255,19 @@ typedef struct {
     Reals loads, kept, lengths, weights, g, changes, reaction;
     I hub;
 } System;
+
+/* Length (m) and its rate (m/s) of the path along the spans of a rope. */
+typedef struct {
+    D length, rate;
+} Path;
+
+/* What is asked of Python: forces of parts that are not in the tables, how these change, and from
+   LAWS on what laws of winches say. */
+enum { FORCES, SLOPES, LAWS };
+typedef I (*Ask)(I what);
+
+/* How a balance ends.  RAISED: Python has refused to answer. */
+enum { BALANCED, UNBALANCED, ENDLESS, PIVOT, ROPES, RAISED };
 
 /* Number of a rope's cable, and whether the rope is at its beginning and at its end. */
 typedef struct {
@@ -297,6 +319,11 @@ void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, con
 D measure(const RopeTable *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
           I n_rates, const Spans *spans);
 Place place_behind(const RopeTable *ropes, I rope, Place before);
+D tension_of(const D *material, D natural, D winding, Path path);
+void wind(const RopeTable *ropes, const D *wound, I n_wound, const D *rates, I n_rates, const Drums *drums);
+void find_paths(const RopeTable *ropes, const Spans *spans, D *paths);
+I turn_winches(const Answering *own, const RopeTable *ropes, Ask ask);
+I find_left(const Answering *own, const RopeTable *ropes, Ask ask, D *left, I n);
 D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g);
 I find_slopes(const Roped *roped, const PulleyLaws *laws);
 void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,

@@ -12,14 +12,8 @@ static const D FALL = 0.3;
    differs from the last one says that the tangent is wrong there. */
 static const D ALIKE = 0.7;
 
-/* What Python adds: winches that answer to their ropes, forces of parts that are not in the tables,
-   and how both change. */
+/* What there is beside the tables: winches that answer to their ropes, forces of parts. */
 enum { WINCHES = 1, PARTS = 2 };
-enum { WIND, FORCES, ANSWER, SLOPES };
-typedef I (*Ask)(I what);
-
-/* How it ends.  RAISED: Python has refused to answer. */
-enum { BALANCED, UNBALANCED, ENDLESS, PIVOT, ROPES, RAISED };
 
 I most_iterations(void) { return MOST; }
 
@@ -34,6 +28,17 @@ static D weighted(const D *weights, const D *a, const D *b, I n) {
     D sum = (low[0] + low[2]) + (low[1] + low[3]);
     for (; k < n; k++) sum += weights[k] * a[k] * b[k];
     return sum;
+}
+
+/* Let winches answer to ropes whose spans are measured. */
+I answer_ropes(const Roped *roped, Ask ask) {
+    const RopeTable *ropes = &roped->ropes;
+    const Answering *winches = &roped->winches;
+    const D *turned = winches->turned.at;
+    find_paths(ropes, &roped->spans, winches->paths.at);
+    I how = turn_winches(winches, ropes, ask);
+    if (how == BALANCED) wind(ropes, turned, 0, turned + 2 * winches->on.n, 0, &roped->drums);
+    return how;
 }
 
 /* Forces out of balance on all unknowns, into system->g. */
@@ -56,7 +61,8 @@ I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, c
         rates += cuts[PATHS];
         if (asks & WINCHES) {
             measure(&roped->ropes, roped->behind.at, roped->behind.n, places, 0, rates, 0, &roped->spans);
-            if (ask(WIND)) return RAISED;
+            I how = answer_ropes(roped, ask);
+            if (how != BALANCED) return how;
         }
         D least = pull_cables(system, roped, places, rates, g);
         for (I r = 0; r < roped->drums.natural.n; r++)
@@ -88,7 +94,10 @@ I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, con
     D by_place = (1.0 - with->alpha_m) / ((1.0 - with->alpha_f) * with->beta * step * step);
     I strung = border->used.at[STRUNG], factors = 0;
     if (roped->ropes.starts.n > 0) {
-        if (asks & WINCHES && ask(ANSWER)) return RAISED;
+        if (asks & WINCHES) {
+            I how = find_left(&roped->winches, &roped->ropes, ask, roped->left.at, roped->left.n);
+            if (how != BALANCED) return how;
+        }
         factors = find_slopes(roped, &system->laws);
     }
     I wide = (factors + 3 * strung + 7) / 8 * 8;

@@ -30,11 +30,6 @@ D measure(const RopeTable *ropes, const I *behind, I pulleys, const D *places, I
     return least;
 }
 
-/* Length (m) and its rate (m/s) of the path along the spans of a rope. */
-typedef struct {
-    D length, rate;
-} Path;
-
 static Path path_of(const RopeTable *ropes, const Spans *spans, I rope) {
     Path found = {0.0, 0.0};
     for (I i = ropes->starts.at[rope]; i < ropes->ends.at[rope]; i++) {
@@ -42,6 +37,15 @@ static Path path_of(const RopeTable *ropes, const Spans *spans, I rope) {
         found.rate += spans->rate.at[i];
     }
     return found;
+}
+
+/* Lengths of all paths, and their rates behind them. */
+void find_paths(const RopeTable *ropes, const Spans *spans, D *paths) {
+    I count = ropes->starts.n;
+    for (I rope = 0; rope < count; rope++) {
+        Path found = path_of(ropes, spans, rope);
+        paths[rope] = found.length, paths[count + rope] = found.rate;
+    }
 }
 
 /* Of the rope behind another one, whose place this is; of the first one behind {-1}. */
@@ -89,23 +93,22 @@ void slide(const RopeTable *ropes, const Drums *drums, const Spans *spans) {
     }
 }
 
-/* Elastic and viscous force of a rope before slack. */
-static D force_of(const RopeTable *ropes, const Drums *drums, I rope, Path path) {
-    const D *material = ropes->material.at + 3 * rope;
-    D natural = drums->natural.at[rope], ratio = path.length / natural;
-    D strain_rate = (path.rate + ratio * drums->winding.at[rope]) / natural;
+/* Elastic and viscous force of a rope before slack, of a material and a natural length (m) that winches
+   take up at a rate (m/s). */
+static D force_of(const D *material, D natural, D winding, Path path) {
+    D ratio = path.length / natural, strain_rate = (path.rate + ratio * winding) / natural;
     D stretch = ratio - 1.0 + material[1] * strain_rate;
     return stretch * material[0];
 }
 
-/* Tension of a force, slack within a width, without compression; ringsim.cable.winches has the same
-   where winches answer to it. */
+/* Tension of a force, slack within a width, without compression. */
 static D smooth(D force, D width) {
     return larger(force, 0.0) + width * log1p(exp(larger(-fabs(force) / width, -200.0)));
 }
 
-static D tension_of(const RopeTable *ropes, const Drums *drums, I rope, Path path) {
-    return smooth(force_of(ropes, drums, rope, path), ropes->material.at[3 * rope + 2]);
+/* Mean tension (N) of a rope that is whole. */
+D tension_of(const D *material, D natural, D winding, Path path) {
+    return smooth(force_of(material, natural, winding, path), material[2]);
 }
 
 /* Tensions of all spans, whose speeds are known. */
@@ -129,7 +132,9 @@ void tighten(const RopeTable *ropes, const Drums *drums, const D *log_decays, I 
             share[i] = exp(share[i] - most);
             mean += share[i] * spans->length.at[i] / path.length;
         }
-        D tension = ropes->alive.at[rope] * tension_of(ropes, drums, rope, path);
+        D tension = ropes->alive.at[rope] * tension_of(ropes->material.at + 3 * rope,
+                                                       drums->natural.at[rope],
+                                                       drums->winding.at[rope], path);
         for (I i = first; i < last; i++) {
             share[i] /= mean;
             spans->tension.at[i] = tension * share[i];
@@ -177,10 +182,10 @@ void read_chain(const RopeTable *ropes, const I *behind, I pulleys, const Drums 
         Path path = path_of(ropes, spans, rope);
         D natural = drums->natural.at[rope], winding = drums->winding.at[rope], width = material[2];
         D alive = ropes->alive.at[rope], strain = path.length / natural - 1.0;
-        D elastic = strain * material[0], mean = alive * tension_of(ropes, drums, rope, path);
+        D elastic = strain * material[0], mean = alive * tension_of(material, natural, winding, path);
         out[rope] = path.length, out[count + rope] = path.rate, out[2 * count + rope] = strain;
         out[3 * count + rope] = (path.rate + path.length / natural * winding) / natural;
-        out[4 * count + rope] = force_of(ropes, drums, rope, path), out[5 * count + rope] = mean;
+        out[4 * count + rope] = force_of(material, natural, winding, path), out[5 * count + rope] = mean;
         out[6 * count + rope] = mean - alive * smooth(elastic, width);
         out[7 * count + rope] = alive * energy_of(elastic, width) / material[0];
         D beyond = 0.0;
@@ -365,7 +370,7 @@ void tension_changes(const RopeTable *ropes, const Drums *drums, const D *log_de
         Path path = path_of(ropes, spans, r);
         const D *material = ropes->material.at + 3 * r;
         D natural = drums->natural.at[r], winding = drums->winding.at[r];
-        D slack = 0.5 + 0.5 * tanh(0.5 * force_of(ropes, drums, r, path) / material[2]);
+        D slack = 0.5 + 0.5 * tanh(0.5 * force_of(material, natural, winding, path) / material[2]);
         D elastic = material[0] / natural * slack, viscous = elastic * material[1];
         D own = by_place * left[r];
         D stretched = own * (elastic + viscous * winding / natural) + by_rate * viscous;

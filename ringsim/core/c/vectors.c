@@ -85,6 +85,6 @@ I words_of_table(I number) {
     const I words[] = {WORDS(Mesh), WORDS(Pose), WORDS(Strains), WORDS(Fronts), WORDS(Border),
                        WORDS(Tape), WORDS(Acting), WORDS(Web), WORDS(Coefficients), WORDS(Followed),
                        WORDS(Moving), WORDS(Held), WORDS(PathPoints), WORDS(Arms), WORDS(PulleyLaws), WORDS(RopeTable),
-                       WORDS(Drums), WORDS(Spans), WORDS(Seen), WORDS(Roped), WORDS(System)};
+                       WORDS(Drums), WORDS(Spans), WORDS(Seen), WORDS(Answering), WORDS(Roped), WORDS(System)};
     return words[number];
 }

@@ -1,0 +1,250 @@
+/* Winches that answer to their ropes within a step; the equations stand in ringsim/core/winches.py. */
+
+#include "core.h"
+
+/* Change of path in m by which the answer of the winches to the structure is measured: a hundred
+   million roundings of a path of 1 m, and still a force of 1e-3 N at EA = 1e5 N. */
+static const D NUDGE = 1e-8;
+/* Secants before the bracket is halved: from the last answer three or four are enough. */
+enum { SECANTS = 8 };
+/* Speeds (m/s, and relative) that are one: over a step of 0.1 s they wind 1e-14 m more or less, of
+   which a rope of EA = 1e5 N takes no notice (1e-10 N). */
+static const D SAME = 1e-15, ALIKE = 1e-11;
+
+/* Places of told: what a law sees, and what it says. */
+enum { TENSION, PATH_RATE, PATH_SLOPE, TIME, LAGGING, LAG, SAID };
+/* What is asked of a winch: the speed that its law commands, or ln(eta) of all pulleys at the speeds
+   that are foreseen. */
+enum { COMMAND, DECAYS, QUESTIONS };
+
+/* Times (s) for which a speed and its mean in the step before count, and these means of the rope
+   wound and of the path given free, m/s. */
+typedef struct {
+    D own, past, wound, freed;
+} Weights;
+
+/* A rope with the winches that answer to it, where a step is tried. */
+typedef struct {
+    const Answering *own;
+    const RopeTable *ropes;
+    Ask ask;
+    I rope, winches[2], count;
+    Path path;
+    D natural, rest, follow;
+    Weights weights;
+} Asked;
+
+static D median(D a, D b, D c) { return fmax(fmin(a, b), fmin(fmax(a, b), c)); }
+
+static Weights weights_of(const Answering *own, I rope) {
+    const D *past = own->past.at + 3 * rope;
+    D elapsed = own->elapsed.at[0], ratio = elapsed / past[0];
+    if (past[0] == 0.0 || elapsed == 0.0) return (Weights){elapsed, 0.0, 0.0, 0.0};
+    D behind = elapsed * ratio / (1.0 + 2.0 * ratio);
+    return (Weights){elapsed - behind, behind, past[1] / past[0], past[2] / past[0]};
+}
+
+/* Rope (m) that all winches which answer have wound since the step began. */
+static D wound_by(const Weights *weights, D total) {
+    return weights->own * total + weights->past * median(0.0, weights->wound, 2.0 * total);
+}
+
+/* Rate (m/s) at which the structure gives path free for them, but for what other winches wind. */
+static D takeup_of(const Asked *asked) {
+    const D *began = asked->own->began.at + 2 * asked->rope;
+    const Weights *with = &asked->weights;
+    if (asked->own->elapsed.at[0] == 0.0) return -asked->path.rate - asked->rest;
+    D freed = began[0] - asked->path.length - (began[1] - asked->natural);
+    /* Where a structure stops, limited as wound_by: both then follow it without a jerk. */
+    return median(freed / with->own, (freed - with->past * with->freed) / with->own,
+                  freed / (with->own + 2.0 * with->past));
+}
+
+/* What the speed of a winch is compared with (m/s), and over what time (s), for its acceleration. */
+static void lag(const Asked *asked, I winch, D *told) {
+    const D *speeds = asked->own->speeds.at + 2 * winch;
+    D elapsed = asked->own->elapsed.at[0], last = asked->own->past.at[3 * asked->rope];
+    told[LAGGING] = speeds[0], told[LAG] = elapsed;
+    if (last == 0.0 || elapsed == 0.0) return;
+    D ratio = elapsed / last, share = 1.0 + 2.0 * ratio, more = 1.0 + ratio;
+    D found = (more * more * speeds[0] - ratio * ratio * speeds[1]) / share;
+    told[LAGGING] = median(0.0, found, 2.0 * speeds[0]), told[LAG] = elapsed * more / share;
+}
+
+/* Tension at a winch over the mean tension of its rope, were it to turn at a speed (m/s) while the
+   structure moves as at the beginning of the step; below 0 if Python has refused to answer. */
+static D ratio_at(const Asked *asked, I winch, D speed) {
+    const Answering *own = asked->own;
+    const RopeTable *ropes = asked->ropes;
+    I first = ropes->starts.at[asked->rope], last = ropes->ends.at[asked->rope];
+    D more = speed - own->speeds.at[2 * winch], path = own->began.at[2 * asked->rope];
+    D beyond = 1.0 - (D)(winch % 2), *logs = own->logs.at, most = 0.0, mean = 0.0;
+    for (I i = first + 1; i < last; i++) {
+        I j = ropes->pulley.at[i];
+        beyond -= own->lengths.at[i - 1] / path;
+        own->seen.at[j] = own->sliding.at[j] + more * beyond;
+    }
+    if (own->moves && asked->ask(LAWS + QUESTIONS * winch + DECAYS)) return -1.0;
+    logs[first] = 0.0;
+    for (I i = first + 1; i < last; i++) {
+        I j = ropes->pulley.at[i];
+        logs[i] = logs[i - 1] + own->decays.at[j] * tanh(own->seen.at[j] / ropes->slip_speed.at[j]);
+        if (logs[i] > most) most = logs[i];
+    }
+    for (I i = first; i < last; i++) mean += exp(logs[i] - most) * own->lengths.at[i] / path;
+    return ropes->alive.at[asked->rope] * exp(logs[winch % 2 ? last - 1 : first] - most) / mean;
+}
+
+/* How much faster the winches of a rope turn at a speed (m/s) of all than their laws command. */
+static I excess(const Asked *asked, D total, D *over) {
+    const Answering *own = asked->own;
+    D *told = own->told.at, elapsed = own->elapsed.at[0];
+    D left = asked->natural - wound_by(&asked->weights, total);
+    D mean = tension_of(asked->ropes->material.at + 3 * asked->rope, left, total + asked->rest,
+                        asked->path);
+    *over = total;
+    for (I k = 0; k < asked->count; k++) {
+        I winch = asked->winches[k];
+        const D *limits = own->limits.at + 2 * winch, *slopes = own->slopes.at + 2 * winch;
+        D ratio = ratio_at(asked, winch, total / (D)asked->count);
+        if (ratio < 0.0) return RAISED;
+        told[TENSION] = mean * ratio;
+        told[PATH_RATE] = asked->follow / (D)asked->count;
+        told[PATH_SLOPE] = slopes[0] + elapsed * slopes[1];
+        told[TIME] = own->since.at[winch] + elapsed;
+        lag(asked, winch, told);
+        if (asked->ask(LAWS + QUESTIONS * winch + COMMAND)) return RAISED;
+        if (isnan(told[SAID])) return ENDLESS;
+        own->found.at[winch] = fmin(fmax(told[SAID], limits[0]), limits[1]);
+        *over -= own->found.at[winch];
+    }
+    return isnan(*over) ? ENDLESS : BALANCED;
+}
+
+/* Where the excess is zero, from a guess and how fast it rises there: it rises by at least the speed.
+
+   By secants: an iteration or a step ago the answer was nearly the same.  Halves of the bracket decide
+   where bends lead secants astray. */
+static I search(const Asked *asked, D low, D high, D *total, D *gain, D *over) {
+    D at = fmin(fmax(*total, low), high);
+    I how = excess(asked, at, over);
+    for (I k = 0; how == BALANCED; k++) {
+        D same = SAME + ALIKE * fabs(at), before = *over, from = at;
+        *(before > 0.0 ? &high : &low) = at;
+        if (fabs(before) <= same || high - low <= 2.0 * same) {
+            *total = at;
+            return BALANCED;
+        }
+        /* Never a shorter way, so that the root is passed and held from both sides: a step that is
+           short since the gain was too large proves nothing. */
+        D way = fmax(fabs(before) / *gain, same);
+        at = k < SECANTS ? fmin(fmax(at - copysign(way, before), low), high) : 0.5 * (low + high);
+        how = excess(asked, at, over);
+        if (k < SECANTS) *gain = fmax((*over - before) / (at - from), 1.0);
+    }
+    return how;
+}
+
+/* The speeds of the winches that answer to a rope, into found. */
+static I answer(const Asked *asked) {
+    const Answering *own = asked->own;
+    const D question[] = {own->elapsed.at[0], asked->path.length, asked->path.rate, asked->natural,
+                          asked->rest};
+    D *known = own->asked.at + 5 * asked->rope, *balance = own->balance.at + 2 * asked->rope;
+    D low = 0.0, high = 0.0, over = 0.0;
+    bool same = true;
+    /* A tangent asks what its residual has asked. */
+    for (I k = 0; k < 5; k++) same = same && known[k] == question[k];
+    if (same) return BALANCED;
+    known[0] = NAN;
+    for (I k = 0; k < asked->count; k++) {
+        const D *limits = own->limits.at + 2 * asked->winches[k];
+        low += limits[0], high += limits[1];
+    }
+    I how = search(asked, low, high, balance, balance + 1, &over);
+    if (how != BALANCED) return how;
+    /* Steep commands amplify the last bits of the total: share these out. */
+    for (I k = 0; k < asked->count; k++) {
+        D *found = own->found.at + asked->winches[k];
+        *found = asked->count == 1 ? balance[0] : *found + over / (D)asked->count;
+    }
+    memcpy(known, question, sizeof question);
+    return BALANCED;
+}
+
+/* What is asked of a rope, at its place; no winches if none answers. */
+static Asked asked_of(const Answering *own, const RopeTable *ropes, Ask ask, I rope, Place place) {
+    I near = 2 * place.cable, count = ropes->starts.n, cables = own->on.n;
+    const D *wound = own->held.at, *speeds = own->held.at + 2 * cables;
+    Asked found = {.own = own, .ropes = ropes, .ask = ask, .rope = rope};
+    found.path = (Path){own->paths.at[rope], own->paths.at[count + rope]};
+    found.natural = ropes->content.at[rope];
+    for (I end = 0; end < 2; end++) {
+        if (!(end ? place.ends : place.begins)) continue;
+        found.natural -= wound[near + end];
+        found.rest += speeds[near + end];
+        if (own->on.at[near + end]) found.winches[found.count++] = near + end;
+    }
+    if (found.count) {
+        found.weights = weights_of(own, rope);
+        found.follow = -takeup_of(&found);
+    }
+    return found;
+}
+
+/* Rope wound and speeds of all winches, into turned, for the paths of all ropes; others are held. */
+I turn_winches(const Answering *own, const RopeTable *ropes, Ask ask) {
+    I ends = 2 * own->on.n;
+    D *wound = own->turned.at, *speeds = own->turned.at + ends;
+    Place place = {-1, false, false};
+    memcpy(wound, own->held.at, (size_t)(2 * ends) * sizeof(D));
+    for (I rope = 0; rope < ropes->starts.n; rope++) {
+        place = place_behind(ropes, rope, place);
+        Asked asked = asked_of(own, ropes, ask, rope, place);
+        if (!asked.count) continue;
+        I how = answer(&asked);
+        if (how != BALANCED) return how;
+        D total = own->balance.at[2 * rope];
+        /* All share what they wind together by their speeds. */
+        D lasting = total == 0.0 ? own->elapsed.at[0] : wound_by(&asked.weights, total) / total;
+        for (I k = 0; k < asked.count; k++) {
+            I winch = asked.winches[k];
+            speeds[winch] = own->found.at[winch];
+            wound[winch] += own->found.at[winch] * lasting;
+        }
+    }
+    return BALANCED;
+}
+
+/* Share of a change of path that stretches each rope, not answered by its winches. */
+I find_left(const Answering *own, const RopeTable *ropes, Ask ask, D *left, I n) {
+    Place place = {-1, false, false};
+    for (I rope = 0; rope < n; rope++) {
+        place = place_behind(ropes, rope, place);
+        Asked asked = asked_of(own, ropes, ask, rope, place);
+        left[rope] = 1.0;
+        if (!asked.count) continue;
+        D wound[2];
+        for (I k = 0; k < 2; k++) {
+            asked.path.length = own->paths.at[rope] + (D)k * NUDGE;
+            asked.follow = -takeup_of(&asked);
+            I how = answer(&asked);
+            if (how != BALANCED) return how;
+            wound[k] = wound_by(&asked.weights, own->balance.at[2 * rope]);
+        }
+        left[rope] = fmin(fmax(1.0 + (wound[1] - wound[0]) / NUDGE, 0.0), 1.0);
+    }
+    return BALANCED;
+}
+
+/* See ratio_at, of a winch by its number, 2 cable + end; -1 for one that does not answer. */
+D ratio_of_winch(const Answering *own, const RopeTable *ropes, Ask ask, I winch, D speed) {
+    Place place = {-1, false, false};
+    for (I rope = 0; rope < ropes->starts.n; rope++) {
+        place = place_behind(ropes, rope, place);
+        Asked asked = asked_of(own, ropes, ask, rope, place);
+        for (I k = 0; k < asked.count; k++)
+            if (asked.winches[k] == winch) return ratio_at(&asked, winch, speed);
+    }
+    return -1.0;
+}
