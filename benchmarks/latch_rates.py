@@ -13,7 +13,9 @@ import numpy as np
 
 from ringsim.frame.integrate import Integration
 from ringsim.frame.model import FrameModel
-from ringsim.outputs.base import SURE, jolted, slowest_period, uncertain
+from ringsim.layout.layout import layout_of
+from ringsim.outputs.base import SURE, jolted, uncertain
+from ringsim.outputs.family import slowest_period
 from ringsim.scene import Scene, load_scene
 from ringsim.stepping.locks import History, history, lock_times
 
@@ -33,7 +35,7 @@ def found(scene: Scene, share: float) -> tuple[History, np.ndarray]:
     times, angles, rates = (np.array(each) for each in (run.times, run.angles, run.rates))
     told = history(own, times, angles, rates)
     locks = lock_times(times, angles, rates)
-    return told, uncertain(told, jolted(times, locks, slowest_period(own)))
+    return told, uncertain(told, jolted(times, locks, slowest_period(layout_of(own))))
 
 
 def main() -> None:

@@ -167,7 +167,7 @@ class Integration(Run):
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
         self._raised: BaseException | None = None
-        self.history = Recorder(scene, self._readings.coordinates())
+        self.history = Recorder(scene, self._readings.coordinates(), model.layout)
         ropes = None if built.cables is None else built.cables.ropes.content
         self._set_out(
             self._measured(0.0),

@@ -212,7 +212,7 @@ class FrameCables:
             self._taped(1, "decay"), self._taped(2, "by_angle", "by_speed"), friction.moves,
             friction.loads,
         )  # fmt: skip
-        self._retable()
+        self.roped = self._retabled()
 
     def _taped(self, results: int, *names: str) -> Tape:
         """What the laws of the pulleys' friction say of all pulleys."""
@@ -252,7 +252,7 @@ class FrameCables:
         winches have wound (m) and how fast they turn (m/s), shape (cables, 2).
         """
         self.ropes = ropes
-        self._retable()
+        self.roped = self._retabled()
         self._wind(wound, speed)
         return self._tightened(places, rates)
 
@@ -260,7 +260,7 @@ class FrameCables:
         """Go on with ropes that a fault may have changed."""
         if ropes is not self.ropes:
             self.ropes = ropes
-            self._retable()
+            self.roped = self._retabled()
 
     def begin(self, time: float, state: ChainState, slopes: Array) -> None:
         """Begin a step at a time (s) in a state of the chain; ``slopes`` are the derivatives of the
@@ -295,13 +295,11 @@ class FrameCables:
         self.roped.drums.wind(self.roped.ropes, wound, rate)
         self._turned = _Turned(wound, rate)
 
-    def _retable(self) -> None:
+    def _retabled(self) -> Roped:
         table = self.chain.table(self.ropes, self.path_points.span)
         winches = self.winches.table(self.ropes)
-        self.roped = Roped.of(
-            self.ropes, table, winches, self.points, self._unknowns, hub=self._hub
-        )
         self._turned_at = math.nan
+        return Roped.of(self.ropes, table, winches, self.points, self._unknowns, hub=self._hub)
 
 
 def _told(

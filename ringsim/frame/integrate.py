@@ -66,7 +66,7 @@ class Integration(Run):
         self._taken, self._cubic, self._tried = [0, 0], True, 0
         self._steps: list[tuple[float, Array]] = []
         self._readings = FrameMeters(model)
-        self.history = Recorder(scene, self._readings.coordinates())
+        self.history = Recorder(scene, self._readings.coordinates(), model.layout)
         ropes = None if model.cables is None else model.cables.ropes.content
         first = self._measure(0.0, self._now)
         self._set_out(

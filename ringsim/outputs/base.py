@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.layout.layout import layout_of
 from ringsim.outputs.family import (
     Array,
     ErrorBar,
@@ -21,7 +20,6 @@ from ringsim.outputs.family import (
     Variable,
 )
 from ringsim.parts.solver import LEAST_TOLERANCE, NO_DEVIATIONS
-from ringsim.scene import Scene
 from ringsim.stepping.locks import SURE, UNKNOWN, History, may_decide
 from ringsim.tables import number_text
 
@@ -173,7 +171,7 @@ def _uncertain_rates(run: Run) -> Iterator[TooLong]:
     """
     if not run.scene.stop or not run.scene.stop.latch:
         return
-    rates, times, period = run.history.rates, run.angles.times, slowest_period(run.scene)
+    rates, times, period = run.history.rates, run.angles.times, run.slowest_period
     jerked = jolted(times, run.locks, period)
     unsure = uncertain(run.history, jerked)
     for name, sizes in (("least_latch_rate", -rates), ("peak_latch_rate", rates)):
@@ -227,7 +225,7 @@ def _shaken(run: Run, shocks: Mapping[str, float]) -> Iterator[TooLong]:
     if not shocks or not (record.reactions or record.accelerations):
         return
     locks = run.locks[np.isfinite(run.locks)]
-    times, period = run.angles.times, slowest_period(run.scene)
+    times, period = run.angles.times, run.slowest_period
     first = np.clip(np.searchsorted(times, locks) - 1, 0, len(times) - 2)
     last = np.maximum(np.searchsorted(times, locks + 0.25 * period), first + 1)
     longest = [float(np.diff(times[i : k + 1]).max()) for i, k in zip(first, last, strict=True)]
@@ -293,7 +291,7 @@ def jerked(run: Run) -> str:
         return ""
     first = np.searchsorted(run.angles.times, locks) - 1
     ahead = (first[..., None, None] == first) & (
-        locks[..., None, None] - locks > _DELAY * slowest_period(run.scene)
+        locks[..., None, None] - locks > _DELAY * run.slowest_period
     )
     met = run.history.rates
     asked = np.broadcast_to(np.asarray(latch.min_rate, dtype=float), locks.shape)
@@ -334,15 +332,3 @@ stresses on these and on flights of 4 and 12 sections, 0.32 to 0.82."""
 def _cure(run: Run) -> str:
     constant = run.scene.solver.step_control == "constant"
     return "solver.step" if constant else "solver.tolerance"
-
-
-def slowest_period(scene: Scene) -> float:
-    """Longest of the rods' lowest periods of bending, with pinned ends, s.
-
-    2 pi / w, w = (pi / L)^2 sqrt(E I / (rho A)): S. Timoshenko, Vibration Problems in Engineering.
-    """
-    return max(
-        2.0 * rod.length**2 / math.pi
-        * math.sqrt(rod.density * rod.tube.area / (rod.young_modulus * rod.tube.second_moment))
-        for rod in layout_of(scene).rods
-    )  # fmt: skip

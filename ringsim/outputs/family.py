@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ringsim.cable.records import Cable
 from ringsim.choice import kind_of
 from ringsim.hermite import cubic, monotone_slopes
+from ringsim.layout.layout import Layout, layout_of
 from ringsim.outputs.meters import Reading
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
@@ -70,6 +71,18 @@ class Series:
         return found
 
 
+def slowest_period(layout: Layout) -> float:
+    """Longest of the rods' lowest periods of bending, with pinned ends, s.
+
+    2 pi / w, w = (pi / L)^2 sqrt(E I / (rho A)): S. Timoshenko, Vibration Problems in Engineering.
+    """
+    return max(
+        2.0 * rod.length**2 / math.pi
+        * math.sqrt(rod.density * rod.tube.area / (rod.young_modulus * rod.tube.second_moment))
+        for rod in layout.rods
+    )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Run:
     """A run that has ended."""
@@ -91,6 +104,13 @@ class Run:
     """Which latches hold at its end, shape (planes, sections); None if it did not tell."""
     slight: float = 0.0
     """Energy (J) so small that a run of less has done nothing worth judging."""
+    layout: Layout | None = None
+    """What has moved; None if the scene is to tell."""
+
+    @cached_property
+    def slowest_period(self) -> float:
+        """See the function of this name."""
+        return slowest_period(self.layout or layout_of(self.scene))
 
     def stretches(self) -> list[tuple[NDArray[np.intp], Scene]]:
         """Numbers of the steps that a scene held for, and this scene, one after the other.

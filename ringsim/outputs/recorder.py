@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.layout.layout import Layout
 from ringsim.outputs.base import jerked, unresolved
 from ringsim.outputs.family import (
     COORDINATES,
@@ -54,7 +55,10 @@ class Recorder(Remembering):
 
     changing = ("newton_iterations", "jacobians", "_lost", "_driven")
 
-    def __init__(self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None) -> None:
+    def __init__(
+        self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None,
+        layout: Layout | None = None,
+    ) -> None:  # fmt: skip
         """Begin a run; ``coordinates`` are those that its outputs declare themselves."""
         self._scene, self._coordinates = scene, coordinates or {}
         self._readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
@@ -68,7 +72,7 @@ class Recorder(Remembering):
         self.gaps: list[float] = []
         self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
         self.caught: NDArray[np.bool_] | None = None
-        self.slight = 0.0
+        self.slight, self.layout = 0.0, layout
         self.repeats = self.newton_iterations = self.jacobians = 0
 
     def note(self, now: Reading) -> None:
@@ -182,7 +186,7 @@ class Recorder(Remembering):
         run = Run(
             self._scene, Series(times, angles, grid), Series(times, rates, grid),
             lock_times(times, angles, rates), counts, known, tuple(self._before), self.caught,
-            self.slight,
+            self.slight, self.layout,
         )  # fmt: skip
 
         @cache

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from ringsim.cli import cli
 from ringsim.outputs import VARIABLES
-from ringsim.outputs.base import slowest_period, unresolved
+from ringsim.outputs.base import unresolved
 from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
 from ringsim.simulation import run_frame
@@ -39,7 +39,7 @@ def run(
 
 @pytest.mark.quick
 def test_the_slowest_rod_is_a_pinned_diagonal() -> None:
-    assert slowest_period(run(1.0).scene) == pytest.approx(PERIOD, rel=1e-12)
+    assert run(1.0).slowest_period == pytest.approx(PERIOD, rel=1e-12)
 
 
 @pytest.mark.quick
