@@ -57,6 +57,20 @@ def package(session: nox.Session) -> None:
         session.run("ringsim", "run", "ring18", "--fidelity", "frame", "--out", "ring18.nc")
 
 
+@nox.session(python=PYTHONS[0])
+@nox.parametrize("machine", ["x86_64", "aarch64"])
+def wheels(session: nox.Session, machine: str) -> None:
+    """A wheel for any Linux since glibc 2.28, compiled here for another processor, too."""
+    folder = session.create_tmp()
+    session.install("build", "wheel", "setuptools", "setuptools-scm", "ziglang")
+    zig = f"python -m ziglang cc -target {machine}-linux-gnu.2.28 -mcpu=baseline"
+    where = {"CC": zig, "LDSHARED": f"{zig} -shared", "CFLAGS": "-fno-sanitize=all",
+             "_PYTHON_HOST_PLATFORM": f"linux-{machine}"}  # fmt: skip
+    session.run("python", "-m", "build", "--wheel", "--no-isolation", "--outdir", folder, env=where)
+    plain = [file for file in _in(folder) if file.endswith(f"-linux_{machine}.whl")]
+    session.run("wheel", "tags", "--remove", f"--platform-tag=manylinux_2_28_{machine}", *plain)
+
+
 def _in(folder: str) -> list[str]:
     return sorted(map(str, Path(folder).iterdir()))
 

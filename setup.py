@@ -1,7 +1,7 @@
 """The core in C, for pyproject.toml: once for any processor and, on x86-64, once for AVX2."""
 
 import hashlib
-import platform
+import sysconfig
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -25,7 +25,7 @@ FLAGS = [
     "-fno-math-errno",
     "-Wno-psabi",
 ]
-WIDE = ["-mavx2"] if platform.machine() in ("x86_64", "AMD64") else []
+WIDE = ["-mavx2"] if sysconfig.get_platform().endswith(("x86_64", "amd64")) else []
 
 
 def core(name: str, flags: list[str]) -> Extension:
