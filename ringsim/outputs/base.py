@@ -116,11 +116,13 @@ class BaseRotation(Output):
 _NAMED = 6
 """V-joints that a sentence names at most."""
 
-STEPS = 8.0
-"""Steps in the lowest period of the slowest rod that shocks need.  Measured on `ring18-ground` with
-four sections (17 ms) against frames at a tolerance of 1e-6: frames with 22 give base force, base
-torque and acceleration to 0.5, 9 and 9 %, with 4 to 0.1, 2 and 8 %, with 2.2 to 4, 27 and 4 %, with
-0.9 to 11, 62 and 18 %; exudyn with 2 lacks 34, 73 and 88 % of them."""
+STEPS = 20.0
+"""Steps in the lowest period of the slowest rod that shocks need at locks.  Steps that follow
+shocks are 32 (``ringsim.stepping.repeats.FRONT``).  With 8, loads at the base were off by up to
+18 % on flights of 8 m, with 1 or less by half, and impulses of stops up to 15 times too large."""
+SHARP = {"peak_acceleration_max": 500.0}
+"""The same of numbers that a stop's damper makes within a thousandth of a second, as it begins to
+push at a corner: of 5 rings one had 8.3 m/s^2, and 2.1 with 32."""
 
 
 class TooLong(NamedTuple):
@@ -192,10 +194,6 @@ def _uncertain_rates(run: Run) -> Iterator[TooLong]:
             yield TooLong(factor, name, what, step, lock)
 
 
-_RINGING = 4.0
-"""Periods after a lock in which the largest number may be what long steps have made of its shock.
-In a flight of rods of 8 m (65 ms) 70 of 77 largest base forces that lay more than a period behind
-their lock lay less than 200 ms behind it, and were up to 3 times what finer steps gave."""
 _DELAY = 0.25
 """Time until a jerk has come through a rod over its period."""
 
@@ -217,8 +215,9 @@ def uncertain(found: History, jerked: NDArray[np.bool_]) -> Array:
 
 
 def _shaken(run: Run, shocks: Mapping[str, float]) -> Iterator[TooLong]:
-    """Of numbers with their times (s): whether they were at a lock whose shock lasts no longer than
-    steps.
+    """Numbers of shocks, with their times (s), where the steps that meet a lock are too long for
+    them: all of them, as finer steps may have a larger one at another lock; sharp ones if they were
+    made there.
     """
     record = run.scene.record
     # Steps that follow stresses alone give the largest to 3 %, whatever their share of a period.
@@ -226,18 +225,20 @@ def _shaken(run: Run, shocks: Mapping[str, float]) -> Iterator[TooLong]:
         return
     locks = run.locks[np.isfinite(run.locks)]
     times, period = run.angles.times, run.slowest_period
-    first = np.clip(np.searchsorted(times, locks) - 1, 0, len(times) - 2)
-    last = np.maximum(np.searchsorted(times, locks + 0.25 * period), first + 1)
-    longest = [float(np.diff(times[i : k + 1]).max()) for i, k in zip(first, last, strict=True)]
-    # The rods ring on; of a step that is longer its end tells.
-    ends = np.maximum(times[np.minimum(last, len(times) - 1)], locks + _RINGING * period)
-    enough, what = period / STEPS, f"shocks in the rods (period {1e3 * period:.3g} ms)"
-    near = list(zip(times[first], ends, longest, strict=True))
-    # Finer steps may have their largest shock at another lock.
-    most, lock = max(zip(longest, locks.tolist(), strict=True))
+    steps = np.diff(times)
+    last = np.clip(np.searchsorted(times, locks) - 1, 0, len(steps) - 1)
+    met = np.maximum(steps[last], steps[np.minimum(last + 1, len(steps) - 1)])
+    most, lock = max(zip(met.tolist(), locks.tolist(), strict=True))
     for name, time in shocks.items():
-        if any(begin <= time <= end and step > enough for begin, end, step in near):
-            yield TooLong(enough / most, name, what, most, lock)
+        rods = f"shocks in the rods (period {1e3 * period:.3g} ms)"
+        if most > period / STEPS:
+            yield TooLong(period / STEPS / most, name, rods, most, lock)
+            continue
+        enough = period / SHARP.get(name, STEPS)
+        own = met[(locks <= time) & (time <= locks + period) & (met > enough)]
+        if own.size:
+            what = "the first instants of a shock"
+            yield TooLong(enough / float(own.max()), name, what, float(own.max()), lock)
 
 
 _OFF = re.compile(
@@ -316,17 +317,21 @@ def _to(run: Run, factor: float) -> str:
     # 3 times the steps were enough where 70 would have been told.
     factor = max(factor, _LEAST_FACTOR)
     tolerance = max(_LESS * solver.tolerance * factor**2, LEAST_TOLERANCE)
-    followed = run.scene.record.stress and solver.deviation_tolerance < NO_DEVIATIONS
-    low, high = (math.sqrt(solver.tolerance / tolerance) ** power for power in _POWERS[followed])
+    record = run.scene.record
+    stress = record.stress and solver.deviation_tolerance < NO_DEVIATIONS
+    shocks = record.reactions or record.accelerations
+    powers = _OF_SHOCKS if shocks else _OF_STRESS if stress else _OF_MOTION
+    low, high = (math.sqrt(solver.tolerance / tolerance) ** power for power in powers)
     return f"set solver.tolerance = {tolerance:.1e} ({low:.2g} to {high:.2g} times the steps)"
 
 
 _LESS = 0.9
-_POWERS = {False: (0.7, 1.15), True: (0.3, 0.85)}
-"""Power of the ratio of steps with which their number grows, by whether vibrations of the ring rule
-some of them.  1 if the tolerance ruled all: measured from 2.6 to 17 times on frames of ring18-cable
-and ring18-ground with 4 and 6 sections and truss2, 0.71 to 0.96, up to 1.16 on ring18-flight; with
-stresses on these and on flights of 4 and 12 sections, 0.32 to 0.82."""
+_OF_MOTION, _OF_STRESS, _OF_SHOCKS = (0.7, 1.15), (0.3, 1.0), (0.4, 0.9)
+"""Power of the ratio of steps with which their number grows, by what rules some of them beside the
+tolerance: nothing else, vibrations of the ring, or shocks.  1 if it ruled all: measured from 2.6 to
+17 times on frames of ring18-cable and ring18-ground with 4 and 6 sections and truss2, 0.71 to 0.96,
+up to 1.16 on ring18-flight; with stresses on these and on flights of 4 and 12 sections, 0.32 to
+0.99; with shocks on these, 0.51 to 0.78."""
 
 
 def _cure(run: Run) -> str:

@@ -105,17 +105,19 @@ class Record(Model):
     stress: bool = False
     """Record axial + bending stress, elastic + viscous, at the ends of every rod.  Steps then
     follow how joints swing about their mean angle (``solver.deviation_tolerance``), which is more
-    of them; the shocks of locks take shorter ones still."""
+    of them; the shocks of locks take shorter ones still (``reactions``)."""
     positions: bool = False
     """Record where corners, pins, joints and the hub are, so that drawings show what was computed;
     of 18 sections 4 kB an output time."""
     accelerations: bool = False
-    """Record the largest acceleration of every corner."""
+    """Record the largest acceleration of every corner.  Steps then follow the shocks of locks, some
+    30 a lock."""
     state_interval: Second | None = None
     """Store the whole state at multiples of this and at the end, from which ``ringsim run --from``
     goes on; a step ends at each.  Left out, none is stored."""
     reactions: bool = False
-    """Record force and torque at the base, how it turns, and the impulse of every lock."""
+    """Record force and torque at the base, how it turns, and the impulse of every lock.  Steps then
+    follow the shocks of locks, some 30 a lock."""
     shape: bool = False
     """Record how far corners are at the end from the deployed design."""
     frequency: bool = False

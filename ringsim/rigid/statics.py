@@ -9,6 +9,7 @@ import numpy as np
 
 from ringsim.layout.bodies import Array, JointOpening, Lump, OnBody, OnRod, cross
 from ringsim.layout.layout import OWN, Layout, layout_of
+from ringsim.outputs.family import slowest_period
 from ringsim.parts.ground import Offload
 from ringsim.parts.laws import Switches
 from ringsim.rigid.mechanism import Configuration, Mechanism, body_of, torques_at
@@ -227,7 +228,9 @@ def scales_of(scene: Scene, layout: Layout, ideal: OneCoordinate, ropes: Array |
     pushed = 1e-3 * structure.push * structure.reach
     energy = pushed or 0.5 * inertia * rate**2
     contact = _contact_step(scene, layout)
-    found = Scales(rate, energy, travel, structure.reach, contact_step=contact)
+    found = Scales(
+        rate, energy, travel, structure.reach, contact_step=contact, period=slowest_period(layout)
+    )
     if scene.cables is None or ropes is None:
         return found
     cables, lengths = scene.cables.present(), np.abs(ropes)

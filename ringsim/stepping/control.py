@@ -17,6 +17,7 @@ from ringsim.stepping.repeats import (
     EnergyImbalance,
     Indicator,
     MotionSteps,
+    ShockSteps,
     TensionBend,
 )
 from ringsim.variables import Cause, Fate, Reason, Status
@@ -66,13 +67,15 @@ class RunControl(Remembering):
         turn: float = math.inf,
         strained: Strained = AS_DRAWN,
         sampled: bool = False,
+        follow_shocks: bool = False,
     ) -> None:
         """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop and
         their latches have caught, or one is past it by more than ``limits``, or all are at rest,
         else at ``solver.end_time``; with ``follow_deviations`` steps resolve how the joints deviate
         from their mean angle.  No stop that is reached before the time ``turn`` (s), at which loads
         turn round, ends it.  A structure that is not ``strained`` as it was put together does not
-        begin.  Steps of a run that is ``sampled`` by a controller are cut at every sample.
+        begin.  Steps of a run that is ``sampled`` by a controller are cut at every sample; with
+        ``follow_shocks`` they resolve what locks do to the rods.
         """
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
         self._rest = Rest(start, solver.end_time, scales.energy)
@@ -82,6 +85,7 @@ class RunControl(Remembering):
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
         self._deviations: DeviationSteps | None = None
+        self._shocks: ShockSteps | None = None
         if solver.step_control == "motion":
             self._steps = MotionSteps(solver, scales)
             self._indicators.append(EnergyImbalance(solver, scales))
@@ -89,6 +93,8 @@ class RunControl(Remembering):
             if follow_deviations and solver.deviation_tolerance < NO_DEVIATIONS:
                 duration = scales.travel / scales.rate
                 self._deviations = DeviationSteps(solver.deviation_tolerance, duration)
+            if follow_shocks and locks is not None and locks.stops:
+                self._shocks = ShockSteps(solver, scales.period)
         self._guard = Guard(solver, scales, strained)
         self._shorter: float | None = None
         self._count, self.repeats, self._settled_at = 0, 0, math.inf
@@ -136,7 +142,9 @@ class RunControl(Remembering):
 
     def next_step(self, next_event: float = math.inf) -> float:
         """The next step, s; it must not pass the time ``next_event`` (s), as of a fault."""
-        self._steps.step = min([self._steps.step, *(one.limit for one in self._indicators)])
+        shocks = math.inf if self._shocks is None else self._shocks.limit
+        limits = [one.limit for one in self._indicators]
+        self._steps.step = min([self._steps.step, shocks, *limits])
         end = min(self._solver.end_time, self._settled_at)
         # What comes at once with the end is left to it: the step between them would be too short.
         end = next_event if next_event < end - AT_ONCE else end
@@ -159,6 +167,8 @@ class RunControl(Remembering):
         wanted = [one.shorter(self.now, found) for one in self._indicators]
         if self._locks is not None and isinstance(self._steps, MotionSteps):
             wanted.append(self._locks.shorter(self.now, found, SHORTEST * self._solver.step))
+            if self._shocks is not None:
+                wanted.append(self._shocks.shorter(self.now, found, self._locks.deployed))
         self._shorter = min((one for one in wanted if one is not None), default=None)
         if self._shorter is None and isinstance(self._steps, MotionSteps):
             step = found.time - self.now.time
@@ -177,7 +187,11 @@ class RunControl(Remembering):
         self._count += 1
         self._watch()
         if self.goes_on and self._locks is not None:
+            known = self._locks.deployed.copy()
             self._locks.note(self.now.angles)
+            if self._shocks is not None:
+                new = bool((self._locks.deployed & ~known).any())
+                self._shocks.accept(self.now, locked=new)
             self._locks.latch(before, found)
             self._note_stop(self._locks, before)
             self._note_overrun(self._locks)
@@ -226,7 +240,7 @@ class RunControl(Remembering):
         return self._solver.settling_time if self._locks is None or self._locks.stops else 0.0
 
     def _parts(self) -> dict[str, Remembering]:
-        parts = self._steps, self._guard, self._rest, self._locks, self._deviations
+        parts = self._steps, self._guard, self._rest, self._locks, self._deviations, self._shocks
         found = (one for one in (*parts, *self._indicators) if one is not None)
         return {type(one).__name__: one for one in found}
 

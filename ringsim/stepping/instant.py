@@ -100,6 +100,8 @@ class Scales(NamedTuple):
     slack_tension, slack_energy
         Tension (N) that does not matter, and a tenth of it pulled along every path (J); None
         without cables.
+    period
+        Of the slowest rod, s.
     """
 
     rate: float
@@ -110,6 +112,7 @@ class Scales(NamedTuple):
     first_step: float = math.inf
     slack_tension: float | None = None
     slack_energy: float | None = None
+    period: float = math.inf
 
 
 # What friction, dampers and stops take in a step.

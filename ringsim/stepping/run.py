@@ -156,6 +156,7 @@ class Run(Remembering):
             turn=scene.loads_turn_at,
             strained=strained,
             sampled=self._sampler is not None,
+            follow_shocks=scene.record.reactions or scene.record.accelerations,
         )
 
     # What an engine gives.

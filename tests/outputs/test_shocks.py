@@ -16,6 +16,7 @@ from ringsim.outputs.base import unresolved
 from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
 from ringsim.simulation import run_frame
+from ringsim.stepping import repeats
 from ringsim.variables import Fate
 
 AT_ONE = {"peak_base_force": 1.0}
@@ -44,49 +45,42 @@ def test_the_slowest_rod_is_a_pinned_diagonal() -> None:
 
 @pytest.mark.quick
 @pytest.mark.parametrize("record", ["reactions", "accelerations"])
-def test_steps_longer_than_an_eighth_of_its_period_are_told(record: str) -> None:
+def test_steps_longer_than_a_twentieth_of_its_period_are_told(record: str) -> None:
     told = unresolved(run(0.2, **{record: True}), AT_ONE)
     assert told.startswith(
         f"; steps of {200.0 * PERIOD:.3g} ms at the lock at 1 s are too long for shocks"
     )
-    enough = 0.9 * load_scene("ring18").solver.tolerance * (0.125 / 0.2) ** 2
-    assert told.endswith(
-        f"so peak_base_force may be off: set solver.tolerance = {enough:.1e} (1.4 to 1.8 times "
-        "the steps)"
-    )
-    assert unresolved(run(0.12, **{record: True}), AT_ONE) == ""
+    enough = 0.9 * load_scene("ring18").solver.tolerance * (0.05 / 0.2) ** 2
+    assert f"so peak_base_force may be off: set solver.tolerance = {enough:.1e} (" in told
+    assert unresolved(run(0.045, **{record: True}), AT_ONE) == ""
 
 
 @pytest.mark.quick
 def test_far_too_long_steps_are_cured_in_turns() -> None:
-    """Of steps of ten periods, eighty times too long, by 0.15 at once."""
+    """Of steps of ten periods, two hundred times too long, by 0.15 at once."""
     words = unresolved(run(10.0, reactions=True), AT_ONE)
     first = 0.9 * load_scene("ring18").solver.tolerance * 0.15**2
     assert f"set solver.tolerance = {first:.1e} (" in words
 
 
 @pytest.mark.quick
-def test_only_numbers_that_were_made_at_such_a_lock_are_told() -> None:
-    """From the step that meets the lock, at 1 s, to four periods after it."""
-    late = 1.0 + np.array([3.9, 4.5]) * PERIOD
-    for time, told in ((0.5, False), (1.0, True), (late[0], True), (late[1], False)):
-        shocks = {"peak_base_force": 0.5, "peak_rod_stress": time, "peak_base_torque": 1.5}
-        words = unresolved(run(0.2, reactions=True), shocks)
-        assert ("so peak_rod_stress may be off" in words) == bool(words) == told, time
+def test_long_steps_at_any_lock_may_hide_a_larger_number() -> None:
+    shocks = {"peak_base_force": 0.5, "peak_rod_stress": 1.0, "peak_base_torque": 1.5}
+    words = unresolved(run(0.2, reactions=True), shocks)
+    assert "so peak_base_force, peak_rod_stress, peak_base_torque may be off" in words
 
 
-def test_a_run_tells_which_of_its_numbers_long_steps_make_wrong() -> None:
-    """Base loads of a ring that is pulled open from its start are largest there, far from locks."""
-    values = {
-        "structure.sections": 4, "boom.base": "fixed", "record.reactions": True, "stop.latch": True,
-    }  # fmt: skip
-    scene = load_scene("ring18-cable").with_values(values)
-    outcome = run_frame(scene)
-    (words,) = re.findall(r", so (.*) may be off", outcome.reason)
-    force = np.linalg.norm(outcome.values["base_force"], axis=0)
-    start = np.nanargmax(force) * scene.record.interval < np.nanmin(outcome.values["lock_time"]) - 1
-    assert start == ("peak_base_force" not in words.split(", "))
-    assert "peak_lock_impulse" in words.split(", ")
+@pytest.mark.quick
+def test_first_instants_of_a_shock_count_for_accelerations_that_were_made_there() -> None:
+    """At the lock, at 1 s, and until a period after it."""
+    for share, time, told in (
+        (0.045, 1.0, True), (0.045, 1.0 + 0.9 * PERIOD, True), (0.045, 1.0 + 1.1 * PERIOD, False),
+        (0.045, 0.99, False), (0.0019, 1.0, False),
+    ):  # fmt: skip
+        shocks = {"peak_base_force": time, "peak_acceleration_max": time}
+        words = unresolved(run(share, accelerations=True), shocks)
+        assert ("first instants of a shock, so peak_acceleration_max may" in words) == told, time
+        assert bool(words) == told
 
 
 @pytest.mark.quick
@@ -94,8 +88,8 @@ def test_steps_count_at_locks_alone_and_where_shocks_are_recorded() -> None:
     def shocks(at: float) -> dict[str, float]:
         return {"peak_base_force": at}
 
-    assert "lock at 0.5 s" in unresolved(run(0.05, lock=0.5, reactions=True), shocks(0.5))
-    assert unresolved(run(0.05, lock=1.9, reactions=True), shocks(1.9)) == ""
+    assert "lock at 0.5 s" in unresolved(run(0.04, lock=0.5, reactions=True), shocks(0.5))
+    assert unresolved(run(0.04, lock=1.9, reactions=True), shocks(1.9)) == ""
     assert unresolved(run(0.2, reactions=True), {}) == ""
     assert unresolved(run(0.2, stress=True), {"peak_rod_stress": 1.0}) == ""
     assert unresolved(run(0.2, lock=math.nan, reactions=True), AT_ONE) == ""
@@ -105,27 +99,51 @@ def test_steps_count_at_locks_alone_and_where_shocks_are_recorded() -> None:
 def test_rings_without_stops_have_no_shocks_and_constant_steps_another_cure() -> None:
     assert unresolved(run(0.2, also={"stop": "none"}, reactions=True), AT_ONE) == ""
     constant = run(0.2, also={"solver.step_control": "constant"}, reactions=True)
-    enough = 0.9 * load_scene("ring18").solver.step * 0.125 / 0.2
+    enough = 0.9 * load_scene("ring18").solver.step * 0.05 / 0.2
     assert unresolved(constant, AT_ONE).endswith(f"set solver.step = {enough:.2g}")
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("ring18-cable", {"structure.sections": 4, "boom.base": "fixed", "stop.latch": True}),
+        ("ring18-flight", {"structure.sections": 4}),
+        pytest.param("ring18-ground", {"structure.sections": 6}, marks=pytest.mark.slow),
+        pytest.param("ring18-cable", {"boom.base": "fixed"}, marks=pytest.mark.slow),
+    ],
+)
+def test_steps_follow_shocks_where_these_are_recorded(
+    name: str, values: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Against steps sixteen times as short at locks, and others of a tenth of the tolerance."""
+    scene = load_scene(name).with_values(values | {"record.reactions": True})
+    first = run_frame(scene)
+    assert "too long for shocks" not in first.reason
+    monkeypatch.setattr(repeats, "FRONT", 16.0 * repeats.FRONT)
+    finer = run_frame(scene.with_values({"solver.tolerance": 0.1 * scene.solver.tolerance}))
+    for each in ("peak_base_force", "peak_base_torque", "peak_lock_impulse"):
+        assert float(first.values[each]) == pytest.approx(float(finer.values[each]), rel=0.12), each
+    # Unasked they cost nothing: the motion alone rules, and does not see locks.
+    plain = run_frame(scene.with_values({"record.reactions": False}))
+    assert float(plain.values["steps"]) < float(first.values["steps"])
 
 
 @pytest.mark.parametrize(
     ("name", "sections"),
     [
         ("ring18-cable", 4),
-        pytest.param("truss2", 2, marks=pytest.mark.slow),
-        pytest.param("ring18-cable", 18, marks=pytest.mark.slow),
+        pytest.param("ring18-flight", 4, marks=pytest.mark.slow),
+        pytest.param("ring18-ground", 6, marks=pytest.mark.slow),
     ],
 )
-def test_the_tolerance_that_is_told_is_enough(name: str, sections: int) -> None:
-    values = {"structure.sections": sections, "record.reactions": True}
+def test_the_cost_of_the_tolerance_that_is_told(name: str, sections: int) -> None:
+    values = {"structure.sections": sections, "record.accelerations": True, "stop.latch": True}
     scene = load_scene(name).with_values(values)
     first = run_frame(scene)
     told = r"set solver\.tolerance = (\S+) \((\S+) to (\S+) times the steps\)"
-    ((tolerance, low, high),) = re.findall(told, first.reason)
+    tolerance, low, high = re.findall(told, first.reason)[0]
     finer = run_frame(scene.with_values({"solver.tolerance": float(tolerance)}))
     assert finer.fate is Fate.DEPLOYED
-    assert "too long for shocks" not in finer.reason
     steps = float(finer.values["steps"]) / float(first.values["steps"])
     assert float(low) <= steps <= float(high)
 
@@ -138,7 +156,7 @@ def test_a_lock_in_the_last_step_counts_that_step() -> None:
 
 def test_the_summary_of_a_run_marks_them(tmp_path: Path) -> None:
     """All that the reason names, and nothing else."""
-    values = ("structure.sections=4", "record.reactions=true", "stop.latch=true")
+    values = ("structure.sections=4", "record.accelerations=true", "stop.latch=true")
     words = ["run", "ring18-cable", "--fidelity=frame", f"--out={tmp_path / 'one.nc'}"]
     text = CliRunner().invoke(cli, [*words, *(f"--set={each}" for each in values)]).output
     (named,) = re.findall(r", so (.*) may be off", text)

@@ -1,0 +1,67 @@
+"""What steps at locks cost, and what they make of the shocks there.
+
+Run: python benchmarks/shock_steps.py
+
+For each scene and number of steps in the slowest rod's period at a lock (``FRONT`` of
+``ringsim.stepping.repeats``): steps, processor time over that of steps that follow the mean motion
+alone, and by how much the largest base force, base torque, impulse of a stop and acceleration are
+larger than with 512 and a tenth of the tolerance.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import ringsim
+from ringsim.stepping import repeats
+
+LARGE = {
+    "structure.sections": 12, "structure.aspect_ratio": 1.0, "structure.half_bar": 1.0287,
+    "structure.half_diagonal": 1.522, "structure.corner_mass": 0.15, "structure.vjoint_mass": 0.1,
+    "rods.diagonal.outer_diameter": 0.025, "rods.diagonal.inner_diameter": 0.023,
+    "rods.bar.outer_diameter": 0.030, "rods.bar.inner_diameter": 0.028, "boom.length": 3.2,
+    "joints.vjoint.coulomb": 0.05, "joints.vjoint.viscous": 2.0, "joints.pivot.coulomb": 0.02,
+    "stop.stiffness": 1000.0, "stop.damping": 2.5, "latch.peak_torque": 0.05,
+    "cables.upper.winch.winding.speed": 400.0, "cables.lower.winch.winding.speed": 380.0,
+}  # fmt: skip
+"""A ring of 8 m, which opens in flight within 17 minutes."""
+SCENES: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("ring18-ground", {}), ("ring18-ground", {"structure.sections": 6}), ("ring18-flight", {}),
+    ("ring18-flight", LARGE),
+)  # fmt: skip
+NAMES = "peak_base_force", "peak_base_torque", "peak_lock_impulse", "peak_acceleration_max"
+FRONTS = 1e-9, 8.0, 32.0, 128.0
+"""The first is none."""
+FINEST = 512.0
+
+
+def found(scene: ringsim.Scene, front: float) -> tuple[dict[str, float], int, float]:
+    """Largest values, steps and processor time of a run with so many steps."""
+    repeats.FRONT, begun = front, time.process_time()
+    run = ringsim.simulate(scene, fidelity="frame")
+    taken = time.process_time() - begun
+    return {name: float(run[name]) for name in NAMES}, int(run["steps"]), taken
+
+
+def main() -> None:
+    """Print a row a scene and number."""
+    print("| scene | steps in a period | steps | time | " + " | ".join(NAMES) + " |")
+    print("|---|---|---|---|" + "---|" * len(NAMES))
+    for name, values in SCENES:
+        plain = {"record.reactions": True, "record.accelerations": True}
+        scene = ringsim.load_scene(name).with_values(values | plain)
+        fine = {"solver.tolerance": 0.1 * scene.solver.tolerance, "solver.step_limit": 200_000}
+        true, *_ = found(scene.with_values(fine), FINEST)
+        once = 0.0
+        for front in FRONTS:
+            own, steps, taken = found(scene, front)
+            once = once or taken
+            errors = " | ".join(f"{100.0 * (own[n] / true[n] - 1.0):+.0f} %" for n in NAMES)
+            words = f"{name}, {scene.structure.sections} sections" + ", 8 m" * (values is LARGE)
+            count = "none" if front < 1.0 else f"{front:g}"
+            print(f"| {words} | {count} | {steps} | {taken / once:.2f} | {errors} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
