@@ -30,7 +30,7 @@ from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.balance import rules
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, InputError, show
 from ringsim.storage.result import Result, check_of
-from ringsim.tables import unit_text
+from ringsim.tables import unit_text, with_unit
 from ringsim.variables import GOALS, TIMINGS, Outcome
 
 
@@ -143,11 +143,14 @@ def _rounded(value: Any) -> str:
     "--check", is_flag=True, help="Repeat the sample's check with the full engine instead."
 )
 @click.option("--save", metavar="FILE", type=PATH, help="Write the run to a netCDF file.")
+@SETTINGS
 @click.option("--solver", "allowed", hidden=True, default="", help="As for ringsim campaign.")
 def replay_command(
-    folder: Path, sample: int, *, scene: bool, check: bool, save: Path | None, allowed: str
-) -> int:
-    """Run SAMPLE of the campaign in FOLDER again in this process, and compare the results.
+    folder: Path, sample: int, *, scene: bool, check: bool, save: Path | None,
+    settings: dict[str, Any], allowed: str,
+) -> int:  # fmt: skip
+    """Run SAMPLE of the campaign in FOLDER again in this process, and compare the results; with
+    --set, tell what the sample would have given so.
 
     Nothing in the folder changes.  Everything that the solver prints is shown; a crash or a hang
     happens here, where a debugger can look at it.
@@ -178,6 +181,7 @@ def replay_command(
         )
     before = next(campaign.survey(checks=check).results([sample]), None)
     values = campaign.table.values_of(sample) | (before.overrides if before is not None else {})
+    values |= settings
     exact = campaign.scene.with_values(values)
     if scene:
         click.echo(exact.to_toml())
@@ -208,6 +212,11 @@ def replay_command(
         click.echo(f"wrote {save}")
     if before is None:
         click.echo("there is no stored result to compare with")
+    elif settings:
+        told = ", ".join(f"{path} = {_rounded(value)}" for path, value in settings.items())
+        click.echo(f"with {told} beside the stored result:")
+        for line in changed(result.arrays(), before.arrays()):
+            click.echo(f"  {line}")
     elif different := _differences(result, before):
         click.echo(f"differs from the stored result ({before.status.word}): {', '.join(different)}")
         if "status" not in different:
@@ -235,6 +244,19 @@ def _differences(result: Result, before: Result) -> list[str]:
         if name not in new or name not in old
         or not np.array_equal(new[name], old[name], equal_nan=new[name].dtype.kind == "f")
     ]  # fmt: skip
+
+
+def changed(new: Arrays, old: Arrays) -> list[str]:
+    """What a summary tells of both, and by how much the new value is larger."""
+    lines = []
+    for name, variable in VARIABLES.items():
+        if variable.summary is None or name in TIMINGS or name not in new or name not in old:
+            continue
+        before, after = float(old[name]), float(new[name])
+        more = f" ({100.0 * (after / before - 1.0):+.2g} %)" if before and before != after else ""
+        values = " -> ".join(with_unit(f"{v:.5g}", variable.units) for v in (before, after))
+        lines.append(f"{variable.summary[0]:<24} {values}{more}")
+    return lines
 
 
 def _bars(arrays: Arrays) -> Arrays:

@@ -175,7 +175,7 @@ def told(found: Found) -> str:
     kinds = f", of kind {' or '.join(found.kinds)}" if found.kinds else ""
     lines = [f"{path} ({found.root} file{kinds})", *_indented(facts(key, path), 2)]
     lines += _indented(key.meaning, 2)
-    return "\n".join([*lines, *_tables(key.models, path)])
+    return "\n".join([*lines, *_tables(key.models, path, key.meaning)])
 
 
 def all_of(root: str) -> str:
@@ -200,8 +200,10 @@ _PULLEYS = """\
   Faults: pulley = "section 6 V", span = "section 6 V to second hinge" (all: span_name of a run)"""
 
 
-def _tables(models: list[type[Model]], path: str) -> Iterator[str]:
-    """What tables hold: what all kinds have, then what each kind has of its own."""
+def _tables(models: list[type[Model]], path: str, said: str) -> Iterator[str]:
+    """What tables hold: what all kinds have, then what each kind has of its own, but for what is
+    ``said`` already.
+    """
     if not models:
         return
     shared = common(models)
@@ -212,7 +214,8 @@ def _tables(models: list[type[Model]], path: str) -> Iterator[str]:
     for model in models:
         kind = kind_in(model)
         yield f'  kind = "{kind}":' if kind else "  keys:"
-        yield from _indented(words_of(model).partition("\n\n")[0], 4)
+        if (words := words_of(model).partition("\n\n")[0]) != said:
+            yield from _indented(words, 4)
         yield from _keys([key for key in keys_of(model) if key.name not in names], path, 4)
 
 

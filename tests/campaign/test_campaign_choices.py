@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from loops import for_each
 
@@ -110,6 +112,15 @@ def test_choices_reach_the_runs_and_the_merged_file(bench):
     assert upper.equals(lower)
     bench.run(*start, solver="")  # nothing is left to run
     assert "identical to the stored result" in bench.run("replay", "out", 1)
+    # With another value, what it would have given: what the summary tells of both, and the way.
+    told = bench.run("replay", "out", 1, "--set", "solver.tolerance=1e-3")
+    assert "with solver.tolerance = 0.001 beside the stored result:" in told
+    stored = int(result.steps.sel(sample=1))
+    before, after, more = re.search(r"\n  steps +(\d+) -> (\d+) \((\S+) %\)", told).groups()
+    assert int(before) == stored != int(after)
+    assert float(more) == pytest.approx(100.0 * (int(after) / stored - 1.0), rel=0.05)
+    assert "identical" not in told
+    assert "did you mean" in bench.run("replay", "out", 1, "--set", "solver.tolerances=1", code=2)
     more = bench.run(*start[:2], "--out", "out", solver="", code=2)
     assert "this folder has another campaign (its scene differs: solver.tolerance" in more
     assert "is not in the range" in bench.run(*start[:2], "--samples", 0, code=2)
