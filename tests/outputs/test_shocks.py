@@ -15,7 +15,7 @@ from ringsim.outputs import VARIABLES
 from ringsim.outputs.base import unresolved
 from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
-from ringsim.simulation import run_frame
+from ringsim.simulation import run_frame, simulate
 from ringsim.stepping import repeats
 from ringsim.variables import Fate
 
@@ -126,6 +126,17 @@ def test_steps_follow_shocks_where_these_are_recorded(
     # Unasked they cost nothing: the motion alone rules, and does not see locks.
     plain = run_frame(scene.with_values({"record.reactions": False}))
     assert float(plain.values["steps"]) < float(first.values["steps"])
+
+
+def test_both_engines_agree_on_shocks() -> None:
+    values = {"structure.sections": 4, "record.accelerations": True}
+    scene = load_scene("ring18-ground").with_values(values)
+    frame, full = (simulate(scene, fidelity=fidelity) for fidelity in ("frame", "full"))
+    for name, share in (
+        ("peak_base_force", 1e-2), ("peak_base_torque", 1e-2), ("peak_lock_impulse", 2e-3),
+        ("peak_acceleration_max", 5e-2), ("peak_latch_rate", 1e-3),
+    ):  # fmt: skip
+        assert float(frame[name]) == pytest.approx(float(full[name]), rel=share), name
 
 
 @pytest.mark.parametrize(
