@@ -316,15 +316,20 @@ class Winches:
         """Whether any winch turns or will turn on a rope that is whole."""
         return driving(self._winches, time + AT_ONCE, state)
 
-    def advance(self, time: float, state: ChainState, slopes: Array) -> None:
+    def advance(
+        self, time: float, state: ChainState, slopes: Array, ropes: Ropes | None = None,
+        roped: RopeTable | None = None,
+    ) -> None:  # fmt: skip
         """Begin a step at ``time`` (s) in a state of the chain.
 
-        ``slopes`` are those of ``path_slopes``.  Called twice at one time it begins anew, as behind
-        a jump: what turned before no longer counts.
+        ``slopes`` are those of ``path_slopes``; ``ropes`` are those that faults have just made of
+        the state's, with their table.  Called twice at one time it begins anew, as behind a jump:
+        what turned before no longer counts.
         """
+        ropes, roped = ropes or state.ropes, roped or state.table
         last, moved, past = time - self._start, state.wound - self._held, self._turning
-        rates, begun, ropes = self._rates, self._begun, state.ropes
-        natural = ropes.content - ropes.per_rope(state.wound)
+        rates, begun = self._rates, self._begun
+        paths, natural = ropes.along(state.lengths), ropes.content - ropes.per_rope(state.wound)
         bends = (slopes - self._slopes) / last if last > 0.0 else 0.0 * slopes
         self._start, self._held, self._slopes = time, state.wound, slopes
         self._rates, self._turning, self._begun = state.wound_rate, {}, {}
@@ -334,7 +339,7 @@ class Winches:
         if not self._turning:
             return
         table = self.table(ropes)
-        self._at = _Begun(table, state.table, state.friction, state.pulleys)
+        self._at = _Begun(table, roped, state.friction, state.pulleys)
         for own in (table.on, table.past, table.balance):
             own[...] = 0
         table.asked[:] = math.nan
@@ -350,7 +355,7 @@ class Winches:
         for place, law in self._turning.items():
             by_rope.setdefault(int(ropes.of_end[place]), {})[place] = law
         for k, laws in by_rope.items():
-            path, length = self._begun[k] = float(state.paths[k]), float(natural[k])
+            path, length = self._begun[k] = float(paths[k]), float(natural[k])
             table.began[k] = path, length
             table.balance[k] = sum(float(state.wound_rate[place]) for place in laws), 1.0
             if last > 0.0 and k in begun and all(past.get(p) is law for p, law in laws.items()):

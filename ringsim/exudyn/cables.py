@@ -246,7 +246,7 @@ class CableDrive:
         """
         self._answered = None
         self._turning.forget()
-        self.winches.advance(time, state, slopes)
+        self.winches.advance(time, state, slopes, self.ropes, self.chain.table(self.ropes))
 
     def current(self, position: Array, velocity: Array, time: float) -> ChainState:
         """The chain at a state of the whole system (total coordinates)."""

@@ -268,10 +268,7 @@ class FrameCables:
         """
         self.roped.seen.forget()
         self._turned_at = math.nan
-        self.winches.advance(time, state, slopes)
-        winches = self.winches.table(self.ropes)
-        if winches is not self.roped.winches:  # behind a fault
-            self.roped = self.roped._replace(winches=winches)
+        self.winches.advance(time, state, slopes, self.ropes, self.roped.ropes)
 
     def refuse(self, places: Array, rates: Array) -> None:
         """ValueError, with what is wrong, where the chain has no answer."""

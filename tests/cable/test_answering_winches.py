@@ -154,3 +154,23 @@ def test_the_tension_at_another_speed_is_foreseen(end: int, speed: float, kind: 
     # Foreseen speeds of the rope leave out terms of first order in strain.
     assert after.strains[1] < 0.01
     assert foreseen == pytest.approx(ratio, rel=2e-3)
+
+
+def test_a_fault_leaves_what_winches_have_wound() -> None:
+    """The step begins in the state before, with the ropes that the fault has made of its own."""
+    motor = MotorWinding(
+        no_load_speed=400.0, stall_torque=0.01, gear_ratio=1000.0, efficiency=0.5, drum_radius=0.02
+    )
+    path = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 1, 0]]
+    case = still(path, 0.01, rate=(0.002, 0.0), initial_slack=0.0101, winch=Winch(winding=motor))
+    state = case.state()
+    split = state.ropes.jam(0, 1, state.stored, case.wound)
+    assert len(split.starts) == 2
+    winches = Winches(case.chain.cables)
+    winches.advance(0.0, state, np.zeros(1), split, case.chain.table(split))
+    paths = case.chain.paths(split, case.points, case.velocities)
+    for time, more in ((0.0, 0.0), (0.1, 0.1)):
+        wound, speed = winches.at(time, *paths)
+        assert wound[0, 0] == pytest.approx(0.01 + more * speed[0, 0], abs=1e-15)
+        assert wound[0, 1] == speed[0, 1] == 0.0
+    assert speed[0, 0] > 0.0
