@@ -186,8 +186,9 @@ class Variable:
     """Number up to which all output times have a value; the run's end where that is missing."""
     gaps: bool = False
     """Whether sound runs lack values at some times, too."""
-    worse: Literal["larger", "smaller", "neither"] = "neither"
-    """Which of two values of a number an engineer fears more: what is told as worst follows it."""
+    worse: Literal["larger", "smaller", "neither", ""] = ""
+    """Which of two values of a number an engineer fears more: what is told as worst follows it.
+    Where it is not said, what is required of the number may tell: ``requirements.badness_of``."""
     largest_of: str = ""
     """Variable with dimensions whose largest value, or magnitude, this number is."""
     least_of: str = ""
@@ -198,7 +199,7 @@ class Variable:
     @property
     def badness(self) -> int:
         """What values are multiplied by so that the worst is the largest; 0 if neither is worse."""
-        return {"larger": 1, "smaller": -1, "neither": 0}[self.worse]
+        return {"larger": 1, "smaller": -1}.get(self.worse, 0)
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,14 @@ import re
 import textwrap
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.analysis import derived
 from ringsim.analysis.design import (
     LOST,
     NOT_RUN,
@@ -183,6 +184,22 @@ def late_line(campaign: xr.Dataset) -> str:
     angle = numbers(campaign, "least_drive_margin_started_angle")[k]
     where = f"sample {int(campaign['sample'][k])}, at {angle:.4g} deg"
     return f"{line}; from then on all have at least {later[k]:.4g} ({where})"
+
+
+def records_line(campaign: xr.Dataset, names: Collection[str] = ()) -> str:
+    """Which of a campaign's own outputs, by default of all, are of records alone, and how far these
+    are apart; empty if none is.
+    """
+    found = derived.of_records(derived.known_from(campaign.attrs))
+    if names:
+        found = [name for name in found if name in names]
+    if not found:
+        return ""
+    scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
+    every = f" every {scene['record.interval']:g} s" * ("record.interval" in scene)
+    verb = "is" if len(found) == 1 else "are"
+    named = " and ".join(filter(None, [", ".join(found[:-1]), found[-1]]))
+    return f"{named} {verb} of records{every}: what happens between two is missed"
 
 
 def _of(count: int, every: int) -> str:
@@ -363,6 +380,8 @@ OFF = "may_be_off"
 """Attribute of an analysis with what ``off_note`` tells, as JSON."""
 LATE = "late_winches"
 """Attribute with ``late_line``."""
+RECORDED = "of_records"
+"""Attribute of an analysis with ``records_line``."""
 
 
 def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], str]:

@@ -39,6 +39,7 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.requirements import (
     OUTCOME,
+    badness_of,
     require_values,
     required_by,
     violations,
@@ -54,6 +55,9 @@ from ringsim.variables import about, flags_of
 
 Both = tuple[xr.Dataset, xr.Dataset]
 Placements = tuple[Placement, Placement]
+BADNESS = "badness"
+"""Attribute of a difference: 1 where larger values are the worse ones, -1 where smaller ones are, 0
+where nothing tells."""
 Indices = NDArray[np.int64]
 Places = tuple[Indices, Indices]
 """Places of the samples of both that are pairs, shape (pairs,) each; empty without pairs."""
@@ -293,9 +297,12 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             NOTE: "; ".join(f"{side}: {each}" for side, each in notes.items() if each),
         },
     )  # fmt: skip
+    wanted = [required_by(each.attrs) for each in (first, second)]
     for name in quantities():
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
+            if f"{name}_difference" in found:
+                found[f"{name}_difference"].attrs[BADNESS] = badness_of(name, *wanted)
     for side, mine, its in zip(SIDES, (first, second), (second, first), strict=True):
         only = (name for name in quantities() if name in mine and name not in its)
         found.attrs[f"only_{side}"] = ", ".join(only)

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import NOTE, marked
+from ringsim.analysis.comparison import BADNESS
 from ringsim.analysis.indices import largest_by_chance
 from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section
@@ -359,7 +360,7 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
         rows.append((
             name, unit_text(unit),
             *(estimate_text(mean, low, high, fine) for mean in (first, second)),
-            estimate_text(apart, low, high), _percent(first, second) if variable.badness else "-",
+            estimate_text(apart, low, high), "-" if _is_place(name) else _percent(first, second),
             interval_text(low, high),
             _worse(found, name),
             str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
@@ -382,11 +383,17 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
     return marked(table, found), [*flat]
 
 
+def _is_place(name: str) -> bool:
+    """Whether an output is the angle at which another one was, of which no share tells anything."""
+    output, angle, _ = name.rpartition("_angle")
+    return bool(angle) and output in quantities()
+
+
 def _percent(first: float, second: float) -> str:
     """The difference in percent of the first; of what may be below zero, as a margin, it would tell
     nothing.
     """
-    if not min(first, second) > NOTHING:
+    if not (first > NOTHING and second > -NOTHING):
         return "-"
     percent = 100.0 * (second - first) / abs(first)
     return f"{percent:+.3g}" if abs(percent) < _FRACTIONS else f"{percent:+.0f}"
@@ -406,7 +413,7 @@ def _worse(found: xr.Dataset, name: str) -> str:
     ends = found[f"{name}_difference_interval"].values
     if found.attrs["runs"]:
         ends = np.full(2, found[f"{name}_difference"].item())
-    ends = np.sort(quantities()[name].badness * ends)
+    ends = np.sort(_badness(found, name) * ends)
     first, second = names_of(found)
     size = np.abs(found[f"{name}_mean"].values).max()
     if abs(found[f"{name}_difference"].item()) < _ALIKE * size or _within(found, name):
@@ -419,4 +426,8 @@ def differing(found: xr.Dataset) -> Iterator[str]:
     table, flat = _outputs(found)
     every = [*(row[0] for row in table.rows), *flat]
     names = [name for name in every if np.isfinite(found[f"{name}_difference"])]
-    yield from sorted(names, key=lambda name: not quantities()[name].badness)
+    yield from sorted(names, key=lambda name: not _badness(found, name))
+
+
+def _badness(found: xr.Dataset, name: str) -> int:
+    return int(found[f"{name}_difference"].attrs.get(BADNESS, quantities()[name].badness))

@@ -70,8 +70,9 @@ class Derived(Model):
     needs a factor in the expression, as max(rod_stress) / 1e6 for MPa."""
     meaning: Annotated[str, Field(max_length=300)] = ""
     """What it is, in words, for tables, figures and reports."""
-    worse: Literal["larger", "smaller", "neither"] = "neither"
-    """Which of two values an engineer fears more."""
+    worse: Literal["larger", "smaller", "neither"] | None = None
+    """Which of two values an engineer fears more; where it is left out, the one that a requirement
+    forbids which bounds it on one side."""
 
     @cached_property
     def tree(self) -> ast.expr:
@@ -95,7 +96,8 @@ class Derived(Model):
     def variable(self, name: str) -> Variable:
         """What files and tables say of it."""
         unit = self.told().symbol if self.unit is None else self.unit
-        return Variable(name, (), unit, self.meaning or f"{name} = {self.of}", worse=self.worse)
+        return Variable(name, (), unit, self.meaning or f"{name} = {self.of}",
+                        worse=self.worse or "")  # fmt: skip
 
     def values(self, known: Mapping[str, xr.DataArray]) -> Any:
         """Its values, NaN where there are none; ``known`` are the variables that it reads."""
@@ -174,6 +176,16 @@ def known_from(attributes: Mapping[Any, Any]) -> dict[str, Derived]:
     extensions.load(extensions.names_of(str(attributes.get("scene", ""))))
     text = str(attributes.get("outputs", ""))
     return _ADAPTER.validate_json(text) if text else {}
+
+
+def of_records(outputs: Mapping[str, Derived]) -> list[str]:
+    """Names of those that read series, which hold a run as often as it was recorded: a peak between
+    two records is missed.
+    """
+    return [
+        name for name, each in outputs.items()
+        if any("time" in VARIABLES[one].dims for one in each.names)
+    ]  # fmt: skip
 
 
 def to_json(outputs: Mapping[str, Derived]) -> str:

@@ -518,12 +518,13 @@ def used(campaign: xr.Dataset) -> xr.Dataset:
     return campaign.isel(sample=np.flatnonzero(good(campaign)))
 
 
-def worst_sample(campaign: xr.Dataset, variable: Variable) -> int:
+def worst_sample(campaign: xr.Dataset, variable: Variable, badness: int | None = None) -> int:
     """The sample whose numbers hold with the worst value; -1 without a value, or where neither end
-    is the worse one.  Of equal ones the first.
+    is the worse one.  Of equal ones the first.  ``badness`` is the variable's own by default.
     """
-    values = variable.badness * numbers(campaign, variable.name)
+    badness = variable.badness if badness is None else badness
+    values = badness * numbers(campaign, variable.name)
     known = good(campaign) & np.isfinite(values)
-    if not variable.badness or not known.any():
+    if not badness or not known.any():
         return -1
     return int(campaign["sample"].to_numpy()[np.argmax(np.where(known, values, -np.inf))])

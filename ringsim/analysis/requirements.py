@@ -98,9 +98,26 @@ class Requirement(Model):
         return np.asarray(np.maximum.reduce(each))
 
 
+def badness_of(name: str, *wanted: Mapping[str, Requirement]) -> int:
+    """What values of an output are multiplied by so that the worst is the largest, 0 if neither end
+    is worse: as the output says, or else by the one side on which something is required of it.
+
+    >>> badness_of("prestress_energy"), badness_of("peak_tension")
+    (0, 1)
+    >>> low = Requirement(min=2.0, probability=0.9, confidence=0.9)
+    >>> badness_of("prestress_energy", {"prestress_energy": low})
+    -1
+    """
+    output = VARIABLES[name]
+    sides = {key for each in wanted if name in each for key, _ in each[name].limits}
+    if output.worse or len(sides) != 1:
+        return output.badness
+    return 1 if sides == {"max"} else -1
+
+
 def doubt_of(name: str, keys: Sequence[str]) -> str:
     """Why bounds of an output are on the side on which nothing is wrong; empty if they are not."""
-    worse = quantities()[name].worse if name in quantities() else "neither"
+    worse = quantities()[name].worse if name in quantities() else ""
     meant = {("larger", "min"): "max", ("smaller", "max"): "min"}
     if len(keys) != 1 or (worse, keys[0]) not in meant:
         return ""

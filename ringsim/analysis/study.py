@@ -13,7 +13,15 @@ from pydantic import Field, ValidationError
 
 from ringsim.analysis import intervals
 from ringsim.analysis.accuracy import in_favour, settings_at
-from ringsim.analysis.campaign_notes import NOTE, OFF, attributes, off_counts, remark_lines
+from ringsim.analysis.campaign_notes import (
+    NOTE,
+    OFF,
+    RECORDED,
+    attributes,
+    off_counts,
+    records_line,
+    remark_lines,
+)
 from ringsim.analysis.derived import known_from
 from ringsim.analysis.design import (
     LOST,
@@ -42,7 +50,12 @@ from ringsim.analysis.intervals import (
     share_interval,
     worst_sample,
 )
-from ringsim.analysis.requirements import Requirement, read_requirements, required_by
+from ringsim.analysis.requirements import (
+    Requirement,
+    badness_of,
+    read_requirements,
+    required_by,
+)
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import rarer, sensitivity
 from ringsim.analysis.tails import tail
@@ -138,11 +151,13 @@ def analyse(
             "stopping": "".join(stopping_lines(campaign, placed)), **attributes(campaign),
             "remarks": "\n".join(remark_lines(campaign)),
             **({"outputs": campaign.attrs["outputs"]} if own else {}),
+            RECORDED: records_line(campaign),
         },
     )  # fmt: skip
     found["part"].attrs = about("share of the completed samples, counted from the first")
     stand = population_of(campaign)
-    found = found.assign(statistics(stand, placed)).assign(tail(campaign)).assign(balance(campaign))
+    found = found.assign(statistics(stand, placed, wanted=wanted)).assign(tail(campaign))
+    found = found.assign(balance(campaign))
     single = one_at_a_time(campaign)  # what each change does is told case by case
     matter = xr.Dataset() if single else influence(stand, wanted, placed)
     more = [outcomes(stand, placed), matter, *([cases(campaign)] if single else [])]
@@ -203,14 +218,18 @@ def _bent(found: xr.Dataset) -> list[str]:
 
 
 def statistics(
-    campaign: xr.Dataset, placed: Placement, names: Collection[str] | None = None
-) -> dict[str, Any]:
-    """All variables about outputs (by default all that have a value), see ``analyse``."""
+    campaign: xr.Dataset, placed: Placement, names: Collection[str] | None = None,
+    wanted: Mapping[str, Requirement] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """All variables about outputs (by default all that have a value), see ``analyse``; what is
+    ``wanted``, by default by the campaign, tells worst samples where the output does not.
+    """
+    wanted = required_by(campaign.attrs) if wanted is None else wanted
     found, seen = dict[str, Any](), dict[str, list[tuple[str, Array]]]()
     for name in quantities() if names is None else names:
         values = numbers(campaign, name)[good(campaign)] if name in campaign else np.empty(0)
         if np.isfinite(values).any():
-            found |= _output(campaign, name, placed)
+            found |= _output(campaign, name, placed, badness_of(name, wanted))
             others = seen.setdefault(quantities()[name].units, [])
             twin = next((other for other, own in others if _equal(own, values)), "")
             if twin:
@@ -235,7 +254,7 @@ def _equal(first: Array, second: Array) -> bool:
     )
 
 
-def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any]:
+def _output(campaign: xr.Dataset, name: str, placed: Placement, badness: int) -> dict[str, Any]:
     """All variables about one output."""
     values, ok = numbers(campaign, name), good(campaign)
     known = ok & np.isfinite(values)
@@ -247,7 +266,7 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
     errors = _errors(campaign, name, known, placed)
     ends = [np.argmin(used), np.argmax(used)]
     bars = numbers(campaign, f"{name}_error")[known][ends]
-    worst = worst_sample(campaign, quantities()[name])
+    worst = worst_sample(campaign, quantities()[name], badness)
     rows: dict[str, tuple[Any, Any, str]] = {
         "": ("statistic", estimates(used, placed), "estimates"),
         "_interval": (

@@ -12,10 +12,12 @@ from ringsim.analysis.campaign_notes import (
     DOUBTED,
     MARK,
     NOTE,
+    RECORDED,
     attributes,
     doubted,
     marked,
     off_note,
+    records_line,
 )
 from ringsim.analysis.design import placement, population_of
 from ringsim.analysis.influence_text import (
@@ -303,11 +305,13 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
     lines += tail_table(found).lines()
     known = margins(campaign).assign_attrs(says)
     lines += slim(doubted(margin_table(known), says)).lines() if known.data_vars else []
+    wanted = required_by(campaign.attrs)
     try:
-        found = judge(population_of(campaign), required_by(campaign.attrs), placed)
+        found = judge(population_of(campaign), wanted, placed)
     except InputError as error:
         return [*lines, f"the requirements cannot be checked: {error}"]
-    return [*lines, *slim(doubted(verdict_table(found.assign_attrs(says)), says)).lines()]
+    lines += slim(doubted(verdict_table(found.assign_attrs(says)), says)).lines()
+    return lines + [*filter(None, [records_line(campaign, wanted)])] * bool(wanted)
 
 
 def not_met(analysis: xr.Dataset) -> list[str]:
@@ -400,6 +404,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     notes += [f"in all samples {', '.join(again)}"] * bool(again)
     if any(row[-2] == "-" for row in rows):
         notes.append("no worst sample of outputs of which nothing says which end is worse")
+    notes += filter(None, [analysis.attrs.get(RECORDED)])
     if within:
         notes.append(f"{_WITHIN}: {'; '.join(within)}")
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)

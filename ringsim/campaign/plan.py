@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.analysis import derived
 from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.analysis.design import placement_of
 from ringsim.analysis.intervals import samples_needed
@@ -26,7 +27,6 @@ from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
 from ringsim.execution.work import Array, Work, relative_cost
 from ringsim.files import MERGED
-from ringsim.outputs import VARIABLES
 from ringsim.refusal import show
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.designs.blocks import Grouped
@@ -79,11 +79,7 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
         f"  workers        {workers}",
         *map(extent_told, table.columns),
     ]
-    recorded = [
-        name for name, each in campaign.specification.outputs.items()
-        if any("time" in VARIABLES[one].dims for one in each.names)
-    ]  # fmt: skip
-    if recorded:
+    if recorded := derived.of_records(campaign.specification.outputs):
         lines.append(
             f"  outputs        read from records every {campaign.scene.record.interval:g} s: "
             f"{', '.join(recorded)}; peaks between two records are missed, a smaller "
@@ -382,10 +378,12 @@ def status_lines(campaign: Folder) -> list[str]:
         lines.append(f"  running        {len(unfinished)}: {listed}")
     if workers and ended.any():
         if ended[0]:
-            rate = workers * ended[0] / max(spent[0], 1e-9)
-            beside = " (without checks)" * bool(ended[1])
-            lines.append(f"  rate           {rate:.3g} samples/s{beside}")
-        about = time_left(campaign, workers)
+            checking = min(workers, sum(number < 0 for number, _ in unfinished))
+            rate = (workers - checking) * ended[0] / max(spent[0], 1e-9)
+            busy = f"{counted(checking, 'worker')} busy with checks" if checking else ""
+            beside = busy or "without checks" * bool(ended[1])
+            lines.append(f"  rate           {rate:.3g} samples/s" + f" ({beside})" * bool(beside))
+        about = time_left(campaign, workers, dict(unfinished))
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     if left and (changed := other_build(campaign)):
         on = "; its workers go on with the build that began it" if workers else ""
@@ -404,37 +402,52 @@ def _next(campaign: Folder, left: int, growth: str) -> str:
     return f"ringsim {verb} {folder}"
 
 
-def time_left(campaign: Folder, workers: int) -> str:
+def time_left(campaign: Folder, workers: int, running: Mapping[int, float] | None = None) -> str:
     """About how long samples, and checks by the other engine, take that are left, by those that
-    have ended.
+    have ended; ``running`` are those that run, each with how long it has, s.
+
+    Before any check has ended one is taken for as many times a sample as in a plan.
     """
     cost, checked = relative_cost(campaign.table, campaign.scene), campaign.unchecked()
     found = campaign.survey()
-    judged = campaign.survey(checks=True) if len(checked) else found
-    samples, checks = len(found.missing), len(checked)
-    # The longest ones, as those with error bars, run first: what is left is cheaper.
-    each = _left(cost, found, found.missing), _left(cost, judged, checked)
-    rest = [(n, seconds) for n, seconds in zip((samples, checks), each, strict=True) if n]
-    known = [(n, seconds) for n, seconds in rest if seconds]
-    if not known:
-        return "not known yet" if rest else "none"
-    # No less than one of the longest: the last ones leave workers idle.
-    shared = sum(n * seconds for n, seconds in known) / workers
-    told = f"about {in_words(max(shared, *(seconds for _, seconds in known)))}"
-    if len(known) < len(rest):
-        rest_of = counted(samples, "sample") if each[1] else counted(checks, "check")
-        told += f", plus {rest_of} of unknown duration"
+    per_sample = _per_cost(cost, found)
+    per_check = _per_cost(cost, campaign.survey(checks=True)) if len(checked) else np.nan
+    guessed = len(checked) > 0 and np.isnan(per_check)
+    left = np.concatenate([found.missing, ~checked]).astype(np.int64)  # as ``check_of``
+    if not len(left):
+        return "none"
+    is_check = left < 0
+    per = np.where(is_check, _FULL * per_sample if guessed else per_check, per_sample)
+    each = per * cost[np.where(is_check, ~left, left)]
+    lasted = np.array([(running or {}).get(number, np.nan) for number in left.tolist()])
+    # Of a check that takes longer than was guessed nobody knows how long.
+    each[is_check & guessed & (lasted > each)] = np.nan
+    runs, known = np.isfinite(lasted), np.isfinite(each)
+    if not known.any():
+        return "not known yet"
+    rest = np.maximum(each - np.where(runs, lasted, 0.0), 0.0)
+    # Workers are free once what they run ends; those with a run of unknown end wait for no sample.
+    free, ends = np.zeros(workers), np.sort(np.where(known, rest, np.inf)[runs])[::-1][:workers]
+    free[: len(ends)] = ends
+    free = np.sort(free if np.isfinite(free).any() else np.zeros(workers))
+    waiting = rest[known & ~runs]
+    # All of it spread over those that are free by then; the last ones leave workers idle.
+    shared = (waiting.sum() + np.cumsum(free)) / np.arange(1, workers + 1)
+    until = shared[np.append(shared[:-1] > free[1:], False).argmin()] if len(waiting) else 0.0
+    until = max(until, free[0] + waiting.max(initial=0.0), rest[runs & known].max(initial=0.0))
+    told = f"about {in_words(float(until))}"
+    if guessed and (is_check & known).any():
+        told += f", a check taken as {_FULL:g} times a sample"
+    for kind, word in ((~is_check, "sample"), (is_check, "check")):
+        if count := int((kind & ~known).sum()):
+            told += f", plus {counted(count, word)} of unknown duration"
     return told
 
 
-def _left(cost: Array, found: Survey, missing: Samples) -> float:
-    """Seconds of one of those that are missing, by the cost of those that are over; 0 if none is
-    either.
-    """
+def _per_cost(cost: Array, found: Survey) -> float:
+    """Seconds of a run of middling cost, by those that are over; NaN if none is."""
     done = np.isfinite(found.seconds)
-    if not len(missing) or not done.any():
-        return 0.0
-    return float(found.seconds[done].sum() / cost[done].sum() * cost[missing].mean())
+    return float(found.seconds[done].sum() / cost[done].sum()) if done.any() else np.nan
 
 
 def _stopping(campaign: Folder, planned: int, end: End | None) -> list[str]:

@@ -316,7 +316,7 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     whole = list(courses.values()) if len(courses) == 1 else []
     yield (
         "Forces on the opening angle in N m, without factors, the drive without the losses of "
-        "pulleys and gears; margins with those of the standard."
+        "pulleys; margins with the factors of the standard."
     )
     rows = [
         [

@@ -179,7 +179,8 @@ def _loads(dataset: xr.Dataset) -> list[xr.DataArray]:
 def base(dataset: xr.Dataset) -> Figure:
     """Of a base that moves ``base_rotation`` (axis, time) and, where positions are recorded, how
     far the boom's upper end has moved since the start; ``base_force`` and ``base_torque`` where
-    they are recorded.  A line an axis; of loads also their magnitude, a dot at its largest value.
+    they are recorded.  A line an axis; of loads also their magnitude, a dot at its largest value of
+    all steps, which is a point of that curve alone.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     shown, told, body = [], list[str](), "base"
@@ -208,7 +209,7 @@ def base(dataset: xr.Dataset) -> Figure:
             peak = peak_of(dataset.assign(size=size), "size", f"peak_{values.name}")
             axes.plot(*peak.within(size), color=style.GREY, linewidth=0.9, zorder=1.5,
                       label="magnitude")  # fmt: skip
-            mark(axes, peak, str(values.attrs["units"]), "")
+            mark(axes, peak, str(values.attrs["units"]), "", curve=size)
     figure.align_ylabels(panels)
     style.time_axes(dataset, shown[0], *panels)
     handles, words = panels[-1].get_legend_handles_labels()

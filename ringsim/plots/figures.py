@@ -5,6 +5,7 @@ import html
 import io
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 import xarray as xr
+from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -142,6 +144,8 @@ HEAVY = 120_000
 _ARTISTS = 800
 """Artists of a figure whose SVG is beyond that: 400 to 600 took 100 to 170 thousand."""
 _DPI = 110
+_SVG_DPI = 72.0
+"""Of what matplotlib draws as lines, whatever the figure's."""
 _PIXELS = 96.0
 """Of a page in an inch; figures larger than drawn would have words larger than the page's."""
 
@@ -172,22 +176,32 @@ class Inline:
             return self._picture
         return self._lines
 
-    @cached_property
-    def _placed(self) -> Figure:
-        """The figure with its layout found once, which costs as much as drawing it twice."""
-        if (engine := self._figure.get_layout_engine()) is not None:
+    @contextmanager
+    def _placed(self, canvas: FigureCanvasBase, dpi: float) -> Iterator[Any]:
+        """The figure's canvas with the layout that it needs itself, found once, which costs as much
+        as drawing it twice: words have other widths in lines, and at each resolution.
+        """
+        engine = self._figure.get_layout_engine()
+        self._figure.set_dpi(dpi)
+        if engine is not None:
             engine.execute(self._figure)
             self._figure.set_layout_engine("none")
-        return self._figure
+        try:
+            yield canvas
+        finally:
+            if engine is not None:  # None would be that of the style
+                self._figure.set_layout_engine(engine)
 
     @cached_property
     @style.styled
     def _lines(self) -> str:
         held, name = io.StringIO(), self._name
-        with matplotlib.rc_context({"svg.hashsalt": name}):
+        with (
+            matplotlib.rc_context({"svg.hashsalt": name}),
+            self._placed(FigureCanvasSVG(self._figure), _SVG_DPI) as canvas,
+        ):
             # By the canvas itself: savefig draws a figure twice that had a layout to find.
-            self._placed.set_dpi(matplotlib.rcParams["savefig.dpi"])
-            canvas: Any = FigureCanvasSVG(self._placed)
+            self._figure.set_dpi(matplotlib.rcParams["savefig.dpi"])
             canvas.print_svg(held, metadata={"Date": None})
         text = held.getvalue()
         text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
@@ -202,9 +216,8 @@ class Inline:
     @cached_property
     @style.styled
     def _picture(self) -> str:
-        self._placed.set_dpi(_DPI)
-        canvas: Any = FigureCanvasAgg(self._placed)
-        canvas.draw()
+        with self._placed(FigureCanvasAgg(self._figure), _DPI) as canvas:
+            canvas.draw()
         drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         # 256 colours are a third of the bytes, and nobody sees a difference.
         few, picture = drawn.quantize(dither=Image.Dither.NONE), io.BytesIO()

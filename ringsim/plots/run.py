@@ -97,7 +97,7 @@ def mark(
 ) -> None:  # fmt: skip
     """A dot at a peak, and its value, time and place in words away from it and from curves.
 
-    ``curve`` (time,) is what was recorded at its place, if the peak is no point of it.
+    ``curve`` (time,) is what was recorded at its place, which may have nothing of the peak.
     """
     if not math.isfinite(peak.value):
         return
@@ -297,7 +297,7 @@ def energy(dataset: xr.Dataset) -> Figure:
     Below them is their imbalance, each in a unit of its own size; ``energy_error`` is stated where
     it is known.
     """
-    figure = Figure(figsize=(8.0, 6.3))
+    figure = Figure(figsize=(8.4, 6.3))  # as wide as the names beside each other at any resolution
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 2))
     factor, units = style.readable_units(*(dataset[name] for name in _LOOKS))
     for name, (colour, dashes) in _LOOKS.items():

@@ -131,12 +131,13 @@ def evidence_of(of: Of, name: str) -> str:
 
 def verdicts(of: Of, name: str = "") -> Answer:
     """The verdict on a requirement; without a name those on all."""
-    found, table = Answer(), verdict_table(of.analysis)
+    found, table, judged = Answer(), verdict_table(of.analysis), list[str]()
     for row in table.rows:
         cell = dict(zip(table.head, row, strict=True))
         own = cell["requirement"].split()[0]
         if name not in ("", own):
             continue
+        judged.append(own)
         bound, lost, go = cell[BOUND], cell["failed runs"], cell["samples to go"]
         found.result.append(
             f"{cell['requirement']} in at least {cell['probability']} of all (confidence "
@@ -147,7 +148,8 @@ def verdicts(of: Of, name: str = "") -> Answer:
             + f", {lost} failed" * (lost != "0")
             + f"; {go} more without a violation would prove it" * (go != "-")
         )
-    return found
+    recorded = notes.records_line(of.campaign, judged) if judged else ""
+    return found + Answer(evidence=[recorded] * bool(recorded))
 
 
 def drawn_lines(of: Of, chosen: Callable[[str, str], bool]) -> list[str]:

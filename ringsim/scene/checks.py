@@ -46,15 +46,20 @@ def _check_limits(scene: "Scene") -> None:
     if scene.limits.rod_stress is not None and not scene.record.stress:
         raise ValueError(
             f"limits.rod_stress = {scene.limits.rod_stress:g} Pa needs the stress of the rods: "
-            "set record.stress = true, or leave the limit out"
+            f"set record.stress = true, or {_without('rod_stress')}"
         )
     for name, unit in (("tension", "N"), ("slack_duration", "s")):
         value = getattr(scene.limits, name)
         if value is not None and scene.cables is None:
             raise ValueError(
-                f"limits.{name} = {value:g} {unit} needs a cable: add [cables.upper], or leave the "
-                "limit out"
+                f"limits.{name} = {value:g} {unit} needs a cable: add [cables.upper], or "
+                f"{_without(name)}"
             )
+
+
+def _without(limit: str) -> str:
+    """How a scene is rid of a limit: a whole table of them takes no "none"."""
+    return f"leave the limit out (--set limits.{limit}=none)"
 
 
 def _check_latch(scene: "Scene") -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 
 import numpy as np
 import pytest
@@ -55,6 +56,28 @@ def test_pairs_show_what_scatter_hides():
     low, middle, high = difference(found := compare(seeded(VALUES), seeded(SHIFTED, seed=1)))
     assert low < 0.0 < 0.01 < high
     assert "not paired" in compared(found)[2]
+
+
+@pytest.mark.quick
+def test_a_difference_is_told_in_percent_of_what_is_not_zero():
+    """Also where the other is zero, and of outputs of which neither end is worse; not of what has
+    other signs, nor of where something was.
+    """
+    size, seeds = np.linspace(1.0, 3.0, 20), np.arange(20)
+    more = {
+        "longest_motor_lag": (size, 0.0 * size), "peak_tension": (0.0 * size, size),
+        "prestress_energy": (2.0 * size, size), "least_drive_margin": (size, -size),
+        "least_drive_margin_angle": (2.0 * size, size),
+    }  # fmt: skip
+    sides = (campaign(size, sample_seed=seeds, **{n: both[k] for n, both in more.items()})
+             for k in (0, 1))  # fmt: skip
+    table = {x.split()[0]: re.split(r"  +", x) for x in compared(compare(*sides)) if x}
+    column = next(cells for cells in table.values() if "in %" in cells).index("in %")
+    told = {name: table[name][column] for name in more if name != "least_drive_margin"}
+    assert told == {
+        "longest_motor_lag": "-100", "peak_tension": "-", "prestress_energy": "-50",
+        "least_drive_margin_angle": "-",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(("share", "worse"), [(5e-4, False), (5e-3, True)])

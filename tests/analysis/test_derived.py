@@ -6,6 +6,7 @@ import json
 import random
 import string
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,16 +15,22 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from made_campaign import made_campaign
 from pydantic import ValidationError
 
 from ringsim import InputError, analyse, compare
 from ringsim.analysis import derived
+from ringsim.analysis.comparison_text import sections
 from ringsim.analysis.derived import FUNCTIONS, Derived, over_samples
+from ringsim.analysis.study_text import statistics_table, told, verdict_lines
 from ringsim.campaign import merging
 from ringsim.campaign.specification import Campaign, campaign_of
 from ringsim.cli import cli
 from ringsim.outputs import VARIABLES
+from ringsim.plots.campaign.numbers import convergence
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
+from ringsim.report.dossier import dossier
+from ringsim.report.page import page
 from ringsim.storage import netcdf
 from ringsim.variables import Status
 
@@ -326,6 +333,75 @@ def test_a_plan_tells_that_records_miss_short_peaks(tmp_path: Path) -> None:
     assert "read from records every 0.05 s: x; peaks between two records are missed" in done.output
     bad = CliRunner().invoke(cli, ["analyse", str(tmp_path / "o")])
     assert bad.exit_code == EXIT_BAD_INPUT
+
+
+BOUND = {"probability": 0.5, "confidence": 0.5}
+
+
+def with_own(bound: dict[str, float], **more: str) -> xr.Dataset:
+    """Eight samples whose own outputs are 0 to 7 degrees, one from series and one from numbers."""
+    made = made_campaign(8)
+    own = {"far_apart": {"of": "max(asynchrony)", **more}, "twice": {"of": "2 * asynchrony_max"}}
+    made["far_apart"] = made["twice"] = "sample", np.arange(8.0), {"units": "degree"}
+    wanted = {"far_apart": bound | BOUND} if bound else {}
+    return made.assign_attrs(outputs=json.dumps(own), requirements=json.dumps(wanted))
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("bound", "more", "worst"),
+    [
+        ({"max": 5.0}, {}, 7),
+        ({"min": 5.0}, {}, 0),
+        ({"min": 1.0, "max": 5.0}, {}, -1),
+        ({}, {}, -1),
+        ({"max": 5.0}, {"worse": "smaller"}, 0),
+        ({"max": 5.0}, {"worse": "neither"}, -1),
+    ],
+)
+def test_what_is_required_on_one_side_tells_which_end_is_worse(
+    bound: dict[str, float], more: dict[str, str], worst: int
+) -> None:
+    """Unless ``worse`` says it: in tables, figures and comparisons."""
+    made = with_own(bound, **more)
+    found = analyse(made)
+    assert int(found["far_apart_worst_sample"]) == worst
+    (row,) = (row for row in statistics_table(found).rows if row[0] == "far_apart")
+    assert row[-2] == ("-" if worst < 0 else str(worst))
+    one = {"far_apart": bound | BOUND} if bound else {}
+    assert int(analyse(made, one)["far_apart_worst_sample"]) == worst
+    other = made.assign(far_apart=made["far_apart"] + 1.0)
+    (table,) = sections(compare(made, other))["outputs"].tables
+    (cells,) = (dict(zip(table.head, row, strict=True)) for row in table.rows
+                if row[0] == "far_apart")  # fmt: skip
+    # Where neither is worse of any output the column is left out.
+    assert cells.get("worse in", "-") == {7: "second", 0: "first", -1: "-"}[worst]
+    # Of 0 to 7 the quantile that is drawn is 6.65, or 0.35 where small values are feared.
+    panel = next(
+        axes for axes in convergence(made).axes
+        if axes.get_title("left").startswith("Far_apart")
+    )  # fmt: skip
+    far = next(x for x in panel.lines if x.get_linestyle() == "--")
+    assert far.get_ydata()[-1] == pytest.approx(0.35 if worst == 0 else 6.65)
+
+
+def test_that_records_miss_what_is_between_them_is_told_where_such_outputs_stand() -> None:
+    """Once in each: in an analysis, on both pages, and below verdicts."""
+    made = with_own({"max": 5.0})
+    every = tomllib.loads(made.attrs["scene"])["record"]["interval"]
+    note = f"far_apart is of records every {every:g} s: what happens between two is missed"
+    for full in (False, True):
+        lines = told(analyse(made), full=full)
+        assert [note in line for line in lines].count(True) == 1
+    assert verdict_lines(made)[-1] == note
+    assert page(made, "runs/made").count(note) >= 1
+    cells = [cell for table in dossier(made) for row in table.rows for cell in row if note in cell]
+    assert len(cells) == 1
+    assert "violate it" in cells[0]
+    # What is of numbers alone misses nothing.
+    wanted = json.dumps({"twice": {"max": 5.0, **BOUND}})
+    plain = made.assign_attrs(requirements=wanted)
+    assert not any("of records" in line for line in verdict_lines(plain))
 
 
 def test_what_expressions_read_may_be_left_out_of_the_file(

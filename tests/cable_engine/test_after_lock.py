@@ -135,6 +135,14 @@ def test_the_stress_has_a_limit_too(engine: str) -> None:
     assert "more than limits.rod_stress = 0.001 MPa" in found.reason
 
 
+def test_a_limit_that_is_refused_is_left_out_as_the_message_says() -> None:
+    limit = {"limits.rod_stress": 1e8}
+    with pytest.raises(InputError, match=r"leave the limit out \(--set limits.rod_stress=none\)"):
+        load_scene("truss2").with_values(limit)
+    left_out = load_scene("truss2").with_values(limit | {"limits.rod_stress": "none"})
+    assert left_out.limits.rod_stress is None
+
+
 @for_each(
     ("values", "words"),
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -19,8 +20,10 @@ import xarray as xr
 
 from campaign_bench import MODULES, Bench, comparable, journals, lose, opened, records
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.plan import time_left
+from ringsim.campaign.plan import status_lines, time_left
 from ringsim.execution.work import relative_cost
+from ringsim.storage.netcdf import locked
+from ringsim.storage.result import check_of
 
 
 @pytest.fixture(scope="module")
@@ -241,7 +244,8 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     assert time_left(checked, 2) == "about 34 s"
     assert time_left(without, 2) == "about 4 s"
     checks[:] = np.nan
-    assert time_left(checked, 2) == "about 4 s, plus 2 checks of unknown duration"
+    # Until one has ended a check is taken for 30 times a sample, as a plan says: 8 + 2 x 120 s.
+    assert time_left(checked, 2) == "about 2.1 min, a check taken as 30 times a sample"
     # The last one leaves workers idle; nothing is known before one has ended.
     samples[:8] = 100.0
     assert time_left(without, 48) == "about 100 s"
@@ -256,6 +260,62 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     barred = SimpleNamespace(**half, unchecked=lambda: np.empty(0, dtype=int))
     assert whole[0] > 2.0 * whole[9]
     assert time_left(barred, 1) == f"about {100.0 * whole[9]:.0f} s"
+
+
+def test_a_worker_that_runs_a_check_runs_no_samples(copied):
+    """Of 40 samples of 8 s each ten are over, and of two workers one is busy with a check."""
+    folder = open_folder(copied.folder / "out")
+    samples, judged = np.full((2, 40), np.nan)
+    samples[:10] = 8.0
+
+    def survey(checks=False):
+        seconds = judged if checks else samples
+        return SimpleNamespace(missing=np.flatnonzero(np.isnan(seconds)), seconds=seconds)
+
+    table = SimpleNamespace(columns=(), samples=40)
+    made = SimpleNamespace(
+        scene=folder.scene, table=table, survey=survey, unchecked=lambda: np.array([0])
+    )
+    # 200 s of the check's 240 s are left, 4 s of a sample, and 29 samples wait for either worker.
+    running = {check_of(0): 40.0, 10: 4.0}
+    told = "about 3.6 min, a check taken as 30 times a sample"
+    assert time_left(made, 2, running) == told
+    # The check alone takes longer than all the samples.
+    samples[12:] = 8.0
+    assert time_left(made, 2, running).startswith("about 3.3 min")
+    samples[12:] = np.nan
+    judged[5] = 100.0
+    assert time_left(made, 2, running) == "about 2.5 min"
+    # Nobody knows when it ends: the other worker is alone, and a single one goes on after it.
+    judged[5] = np.nan
+    running[check_of(0)] = 250.0
+    assert time_left(made, 2, running) == "about 3.9 min, plus 1 check of unknown duration"
+    alone = {check_of(0): 250.0}
+    assert time_left(made, 1, alone) == "about 4.0 min, plus 1 check of unknown duration"
+
+
+def test_the_rate_of_samples_is_of_the_workers_that_run_them(copied):
+    """Twelve samples took 2 s of a worker each; of three workers one runs a check."""
+    lose(copied, range(8))
+    out = copied.folder / "out"
+    told = {
+        "state": "running", "host": "here", "pid": 1, "workers": 3, "updated": time.time(),
+        "spent": [24.0, 0.0], "ended": [12, 0], "running": {check_of(0): 5.0, 0: 1.0, 1: 1.0},
+    }  # fmt: skip
+    (out / "progress-all.json").write_text(json.dumps(told))
+
+    def rate():
+        with locked(out / "lock-all"):
+            return next(x.split(maxsplit=1)[1] for x in status_lines(open_folder(out))
+                        if x.startswith("  rate"))  # fmt: skip
+
+    assert rate() == "1 samples/s (1 worker busy with checks)"
+    told["running"] = {check_of(k): 5.0 for k in range(3)}
+    (out / "progress-all.json").write_text(json.dumps(told))
+    assert rate() == "0 samples/s (3 workers busy with checks)"
+    told |= {"running": {0: 1.0, 1: 1.0, 2: 1.0}, "ended": [12, 1]}
+    (out / "progress-all.json").write_text(json.dumps(told))
+    assert rate() == "1.5 samples/s (without checks)"
 
 
 @pytest.mark.slow  # a signal to one rank, test_campaign_together.py, goes the same way

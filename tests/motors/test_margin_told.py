@@ -15,7 +15,7 @@ from ringsim.parts.margin import EcssMechanisms, NasaMechanisms
 from ringsim.plots import figures
 from ringsim.plots.drives_and_locks import drive
 from ringsim.rigid.margin import DriveMargin
-from ringsim.scene import Scene
+from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 
 
@@ -46,6 +46,24 @@ def test_check_prints_the_margin_of_the_ideal_ring(scene: Scene, tmp_path: Path)
     both = told(tmp_path / "all.toml", scene.with_values({"margin": "none"}))
     assert re.search(r"^ecss-e-st-33-01c: least", both, re.M)
     assert re.search(r"^nasa-std-5017b: least", both, re.M)
+
+
+def test_the_drive_of_the_table_has_the_gears_losses_and_not_the_pulleys(tmp_path: Path) -> None:
+    """Its first line says so, and the columns follow the efficiency but no pulley's friction."""
+
+    def drive_of(values: dict[str, float]) -> float:
+        text = told(tmp_path / "one.toml", load_scene("ring18-motor").with_values(values))
+        assert "the drive without the losses of pulleys; margins" in text.splitlines()[0]
+        head = next(line for line in text.splitlines() if line.startswith("angle"))
+        row = next(line for line in text.splitlines() if line.startswith("60.0"))
+        return float(dict(zip(re.split(r"  +", head), row.split(), strict=True))["by cables"])
+
+    of_scene, cables = drive_of({}), ("cables.upper", "cables.lower")
+    winding = load_scene("ring18-motor").cables.upper.winch.winding
+    half = {f"{cable}.winch.winding.efficiency": 0.5 * winding.efficiency for cable in cables}
+    assert drive_of(half) == pytest.approx(0.5 * of_scene, rel=1e-3)
+    smooth = {f"{cable}.friction.coefficient": 0.0 for cable in cables}
+    assert drive_of(smooth) == of_scene
 
 
 def test_check_does_not_end_with_valid_alone_where_the_drive_is_short(

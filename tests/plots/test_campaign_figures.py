@@ -306,6 +306,34 @@ def test_the_margin_by_ending_and_over_the_angle() -> None:
     assert [t.get_text() for t in margin(campaign).axes[0].texts] == ["required -0.3"]
 
 
+def test_the_band_of_margins_ends_where_the_first_deployed_sample_has_its_last_record() -> None:
+    """Records before 180 deg stand at another angle in each: beyond the first, a band of all would
+    shrink to the margin of one.  Samples that stall end where they do, and cases are whole.
+    """
+    campaign = with_motors(made_campaign(8, stalled=(4, 6)))
+    cut = xr.DataArray([9.9, 9.4, 8.4, 9.9, 5.9, 9.9, 7.9, 9.9], dims="sample")
+    campaign["drive_margin"] = campaign["drive_margin"].where(campaign["time"] <= cut)
+    campaign["drive_margin"] = campaign["drive_margin"] + 0.1 * campaign["sample"]
+    lower = margin(campaign).axes[1]
+    curves = {line.get_label(): line.get_xdata() for line in lower.lines}
+    # 20 deg and 16 deg a second, records every half second, and angles 0.95 deg apart.
+    for label, moment in (("deployed (6)", 8.0), ("stalled (2)", 7.5)):
+        assert 0.0 <= 20.0 + 16.0 * moment - curves[label][-1] < 1.0, label
+    ends = [band.get_paths()[0].vertices for band in lower.collections]
+    last = max(ends, key=lambda each: each[:, 0].max())
+    last = last[np.isclose(last[:, 0], last[:, 0].max())]
+    assert np.ptp(last[:, 1]) > 1.0  # of margins that grow by 0.2 from sample to sample
+    (told,) = (each.get_title().get_text() for each in margin(campaign).legends)
+    said = "The band of deployed samples ends where the first of them has its last record."
+    assert said in " ".join(told.split())
+    campaign.attrs["design"] = json.dumps({"kind": "list"})
+    figure = margin(campaign)
+    assert max(line.get_xdata()[np.isfinite(line.get_ydata())][-1] for line in figure.axes[1].lines
+               if len(line.get_xdata()) > 2) == pytest.approx(20.0 + 16.0 * 9.5)  # fmt: skip
+    (told,) = (each.get_title().get_text() for each in figure.legends)
+    assert "last record" not in told
+
+
 def test_motors_and_base_are_drawn_by_ending() -> None:
     campaign = with_motors(made_campaign(8, stalled=(4, 6), failed=(2,)))
     torques = motors(campaign).axes[::2]

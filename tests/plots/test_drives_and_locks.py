@@ -146,6 +146,17 @@ def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
     assert "(N)" in force.get_ylabel()
     told = "Attitude, place, force and torque of the spacecraft"
     assert " ".join(figure.get_suptitle().split()).startswith(told)
+    # A peak that records miss is told with how far these are apart, and no other one.
+    size = float((run["base_force"] ** 2).sum("axis").max() ** 0.5)
+    between = 0.5 * float(run["time"][3] + run["time"][4])
+    for high, missed in ((9.0 * size, True), (size, False)):
+        seen = run.assign(peak_base_force=high).drop_vars("peak_base_force_time")
+        seen = seen.assign(peak_base_force_time=between) if missed else seen
+        ((_, figure),) = figures_of(seen, "base")
+        (words,) = (t.get_text() for t in figure.axes[2].texts if "largest" in t.get_text())
+        every = f"curves: records every {float(run['time'][1] - run['time'][0]):.3g} s"
+        assert (every in words) == missed
+        assert words.startswith("largest of all steps: " if missed else "largest: ")
     # The title tells no more than there is.
     still = run.assign(base_rotation=0.0 * run["base_rotation"])
     ((_, figure),) = figures_of(still, "base")

@@ -37,6 +37,7 @@ from ringsim.plots.campaign.frame import (
 from ringsim.plots.drives_and_locks import LEAST, drive_end, least_rate, standard_of
 from ringsim.tables import counted as number_of
 from ringsim.tables import with_unit
+from ringsim.variables import Fate
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
 
@@ -186,12 +187,23 @@ def margin(campaign: xr.Dataset) -> Figure:
     rows = [_over_angle(*each) for each in zip(angles, margins.where(~after).values, strict=True)]
     grid = angle_grid(rows)
     laid = np.array([laid_on(grid, *row) for row in rows])
-    bands_by_ending(lower, grid, laid, words, looks_of_cases(campaign, read["sample"].values))
+    cases = looks_of_cases(campaign, read["sample"].values)
+    # Rings that deploy all come to 180 deg, but each has its last record before at another angle:
+    # beyond the first of these a band would be of few samples, and shrink to one.
+    opened = words == Fate.DEPLOYED.words
+    whole = opened & ~after.any("time").to_numpy()
+    ends = [rows[k][0][-1] for k in np.flatnonzero(whole) if len(rows[k][0])]
+    ended = len(ends) > 1 and not cases and max(ends) - min(ends) > _SAME_ANGLE
+    if ended:
+        laid[np.ix_(opened, grid > min(ends) + _SAME_ANGLE)] = np.nan
+    bands_by_ending(lower, grid, laid, words, cases)
     style.margin_axis(lower, np.append(laid, values.min()), f"Margin by {standard_of(campaign)}")
     lower.axhline(0.0, **_ZERO)
     lower.set_xlabel("Mean opening angle (deg)")
     legend(figure, [lower], 4)
     note = f"{counted(campaign, words)} Dotted: the margin of 0 that the standard requires."
+    if ended:
+        note += " The band of deployed samples ends where the first of them has its last record."
     if cut := int(after.any("time").sum()):
         note += (
             f" Curves end where the last winch stops, in {number_of(cut, 'sample')}: nobody "

@@ -25,10 +25,16 @@ from ringsim.analysis.design import (
 )
 from ringsim.analysis.indices import centred_ranks
 from ringsim.analysis.intervals import good, numbers, quantile, ran, tells_of
-from ringsim.analysis.requirements import OUTCOME, Requirement, required_by, violations
+from ringsim.analysis.requirements import (
+    OUTCOME,
+    Requirement,
+    badness_of,
+    required_by,
+    violations,
+)
 from ringsim.analysis.tails import approach, subset_simulation, tail
 from ringsim.analysis.verdicts import judge
-from ringsim.outputs.family import VARIABLES, Array
+from ringsim.outputs.family import Array
 from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
     MOST_PANELS,
@@ -232,7 +238,8 @@ def convergence(campaign: xr.Dataset) -> Figure:
     count = len(names) + len(wanted)
     figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3, most=_COLUMNS)
     # The end that an engineer fears; one name for both, which are drawn alike.
-    levels = [0.05 if VARIABLES[name].badness < 0 else 0.95 for name in names]
+    feared = required_by(campaign.attrs)
+    levels = [0.05 if badness_of(name, feared) < 0 else 0.95 for name in names]
     worse = "quantile at the worse end (95 %; 5 % where less is worse)"
     if len(set(levels)) == 1:
         worse = f"{100 * levels[0]:.0f} % quantile, at the worse end"

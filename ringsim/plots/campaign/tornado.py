@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -229,7 +230,7 @@ def tornado(campaign: xr.Dataset) -> Figure:
     found = every[:_MOST_PANELS]
     found = found or [("", Bars("", [], *_NONE, np.nan, "no significant input" if quiet else
                                 "no sensitivity measure"))]  # fmt: skip
-    # A row is as high as its bars need, and has 0.75 inch of words.
+    # A row is as high as its bars need, and has 0.75 inch of words: of three lines.
     counts = [max(1, len(bars.names)) for _, bars in found]
     rows = [max(counts[k : k + 2]) for k in range(0, len(found), 2)]
     heights = [_BAR * (most + 0.4) for most in rows]
@@ -237,7 +238,7 @@ def tornado(campaign: xr.Dataset) -> Figure:
     figure, panels, _ = style.new_panels(len(found), 5.2, heights, words_of_rows, most=2)
     alike = {bars.told for _, bars in found if bars.names}
     shared = alike.pop() if len(alike) == 1 and len(found) > 1 else ""
-    certain, uncertain = False, False
+    certain, uncertain, titles = False, False, list[Text]()
     for number, (axes, (output, bars)) in enumerate(zip(panels, found, strict=True)):
         _draw(axes, bars)
         # Bars of one height, whatever their number.
@@ -245,15 +246,14 @@ def tornado(campaign: xr.Dataset) -> Figure:
         axes.set_ylim(-0.5 - beside, counts[number] - 0.5 + beside)
         known = np.isfinite(bars.ends).all(axis=1)
         certain, uncertain = certain or bool(known.any()), uncertain or not known.all()
-        # Without its unit, which is not that of the bars; a mark behind it has room.
-        words = style.label(campaign[output], "1", 40) if output in campaign else output
-        axes.set_title(words, fontsize=9.5, color=style.INK)
-        units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
-        unit = unit_behind("", units) if bars.measure == "mean_absolute_effect" else ""
-        below = f"\n{bars.told}" if bars.told and bars.told != shared else ""
-        if bars.names:
-            words = textwrap.fill(f"{MEASURES[bars.measure]}{unit}{_beside(bars)}", _LABEL)
-            axes.set_xlabel(f"{words}{below}", fontsize=9)
+        titles.append(_name(axes, campaign, output, bars, shared))
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)
+    for axes, title, (output, bars) in zip(panels, titles, found, strict=True):
+        _name(axes, campaign, output, bars, shared, *_fitting(figure, axes, title))
+    lines = [axes.get_title("left").count("\n") + axes.get_xlabel().count("\n") for axes in panels]
+    more = sum(max(0, max(lines[k : k + 2]) - 1) for k in range(0, len(panels), 2))
+    figure.set_figheight(figure.get_figheight() + _LINE * more)
     if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
         legend(figure, panels)
     whiskers = "Whiskers: 95 % intervals." if certain else ""
@@ -288,8 +288,51 @@ def _alike(campaign: xr.Dataset, name: str) -> bool:
     return len(np.unique(every)) < 2
 
 
-_LABEL = 48
-"""Characters of a line below a panel's axis."""
+_TITLE, _LABEL, _SHORTEST = 40, 48, 16
+"""Letters of a line above a panel and below its axis, at most, and of either at least."""
+_LINE = 0.155
+"""Height of a further one, inch."""
+_AIR, _MARK, _HINTED = 0.08, 2, 1.05
+"""Blank edge of a sheet, inch; letters of the mark that may follow a title; and how much wider the
+same words are at another resolution, whose letters begin at its dots."""
+
+
+def _name(
+    axes: Axes, campaign: xr.Dataset, output: str, bars: Bars, shared: str,
+    title: int = _TITLE, label: int = _LABEL,
+) -> Text:  # fmt: skip
+    """Put words above and below a panel, in lines of so many letters; those above it."""
+    # Without its unit, which is not that of the bars.
+    words, units = textwrap.fill(output, title), "1"
+    if output in campaign:
+        words = style.label(campaign[output], "1", title)
+        units = campaign[output].attrs.get("units", "1")
+    above = axes.set_title(words, fontsize=9.5, color=style.INK)
+    unit = unit_behind("", units) if bars.measure == "mean_absolute_effect" else ""
+    below = f"\n{bars.told}" if bars.told and bars.told != shared else ""
+    if bars.names:
+        words = textwrap.fill(f"{MEASURES[bars.measure]}{unit}{_beside(bars)}", label)
+        axes.set_xlabel(f"{words}{below}", fontsize=9)
+    return above
+
+
+def _fitting(figure: Figure, axes: Axes, above: Text) -> tuple[int, int]:
+    """Letters of a line above a panel and below its axis that the sheet has room for: names of
+    inputs leave axes narrow, and the layout knows how high words are, not how wide.
+    """
+    box, air = axes.get_window_extent(), _AIR * figure.dpi
+    last, middle = figure.bbox.width - air, 0.5 * (box.x0 + box.x1)
+
+    def fitting(text: Text, most: int, more: int, room: float) -> int:
+        longest = max(1, *map(len, text.get_text().split("\n")))
+        letter = _HINTED * text.get_window_extent().width / longest
+        if letter * (longest + more) <= room:
+            return most
+        return max(_SHORTEST, int(room / letter) - more)
+
+    beside = 2.0 * min(middle - air, last - middle)
+    label = axes.xaxis.label
+    return fitting(above, _TITLE, _MARK, last - box.x0), fitting(label, _LABEL, 0, beside)
 
 
 def _beside(bars: Bars) -> str:
