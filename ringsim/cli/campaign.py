@@ -253,7 +253,9 @@ def changed(new: Arrays, old: Arrays) -> list[str]:
         if variable.summary is None or name in TIMINGS or name not in new or name not in old:
             continue
         before, after = float(old[name]), float(new[name])
-        more = f" ({100.0 * (after / before - 1.0):+.2g} %)" if before and before != after else ""
+        # Of margins, which may be negative, no share tells anything.
+        apart = before > 0.0 and np.isfinite(after) and before != after
+        more = f" ({100.0 * (after / before - 1.0):+.2g} %)" if apart else ""
         values = " -> ".join(with_unit(f"{v:.5g}", variable.units) for v in (before, after))
         lines.append(f"{variable.summary[0]:<24} {values}{more}")
     return lines

@@ -193,12 +193,12 @@ class TensionBend(Indicator):
 
 
 FRONT = 32.0
-"""Steps in the period of the slowest rod at a lock, at the tolerance ``_FRONT_AT`` or above.  On
-flights and ground tests of rings of 12 sections and 8 m, and `ring18-ground`, forces and torques at
-the base, and impulses of stops, are then within 9 % of those of 2048; steps that follow the mean
-motion alone gave a half to 15 times as much, in as much time on flights and 0.4 of it on the
-ground.  Four times as many cost 5 more steps a lock."""
+"""Steps in the period of the slowest rod at a lock, at the tolerance ``_FRONT_AT`` or above.  Base
+forces, torques and impulses of stops of two flights and two ground tests are then within 6 % of
+those of 512 and a tenth of the tolerance; steps that follow the mean motion alone gave a quarter to
+three times as much (benchmarks/shock_steps.py).  Four times as many cost 5 more steps a lock."""
 _FRONT_AT = 3e-3
+"""That of the scenes with cables; below it steps go with its square root, as all others do."""
 _FINEST_FRONT = 512.0
 """The same at most: with 6000, round-off of the places of a spacecraft of 500 kg was 1 N of base
 force, which falls with the square of steps."""

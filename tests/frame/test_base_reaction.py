@@ -197,6 +197,22 @@ def test_impulse_of_a_lock_is_not_what_presses_on(after: float) -> None:
     assert found == pytest.approx(2.0 * inertia * met + load * held, rel=1e-3)
 
 
+def test_impulse_of_a_lock_is_not_what_a_joint_creeps_on_under() -> None:
+    """A stop that only brakes takes I w (1 - exp(-t / tau)) until the rate is a fiftieth, and as long
+    again; then the joint creeps on at 0.0105 of its rate under a load that rises.
+    """
+    inertia, met, brakes, start = 0.7, 0.4, 0.01, 0.123
+    times = np.arange(0.0, start + 20.0, 1e-4)
+    since = np.maximum(times - start, 0.0)
+    faded = np.exp(-since / brakes)
+    rest = 2.0 * brakes * math.log(50.0)
+    load = 3.0 * np.maximum(since - rest, 0.0)
+    torques = np.where(times > start, inertia * met / brakes * faded + load, 0.0)
+    rates = met * np.maximum(faded, 0.0105)
+    found = first_impulse(times, torques, rates, start)
+    assert found == pytest.approx(inertia * met * (1.0 - 50.0**-2), rel=2e-3)
+
+
 LOCKING: dict[str, Any] = {
     "structure__sections": 3, "structure__opening_angle": 165.0, "loads__force": 0.1,
     "solver__step": 5e-4, "solver__end_time": 0.6, "stop__latch": True,
