@@ -198,8 +198,8 @@ def test_impulse_of_a_lock_is_not_what_presses_on(after: float) -> None:
 
 
 def test_impulse_of_a_lock_is_not_what_a_joint_creeps_on_under() -> None:
-    """A stop that only brakes takes I w (1 - exp(-t / tau)) until the rate is a fiftieth, and as long
-    again; then the joint creeps on at 0.0105 of its rate under a load that rises.
+    """A stop that only brakes takes I w (1 - exp(-t / tau)) until the rate is a fiftieth, and as
+    long again; then the joint creeps on at 0.0105 of its rate under a load that rises.
     """
     inertia, met, brakes, start = 0.7, 0.4, 0.01, 0.123
     times = np.arange(0.0, start + 20.0, 1e-4)
