@@ -162,6 +162,9 @@ class ErrorBar:
     """What may be wrong, for the bar's ``long_name``."""
     safety: float
     """Bar over the error that the difference of the two runs shows."""
+    of: str = ""
+    """Variable of many places of which it is the largest or least: two runs may agree in one number
+    by chance, and hardly in all of these."""
 
 
 @dataclass(frozen=True)

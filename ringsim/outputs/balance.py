@@ -217,13 +217,18 @@ def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
     """Differences of two runs of a scene in what has an error bar, as far as both have it.
 
     The largest difference of all joints and output times; of a function of time alone the largest
-    up to each output time, shape (time,).
+    up to each output time, shape (time,); of the largest of many places at least the root mean
+    square of theirs.
     """
     apart: dict[str, Array] = {}
-    for name in rules():
+    for name, rule in rules().items():
         if name in one.values:
             first, second = one.values[name], other.values[name]
             found = largest(name, np.abs(first - second))
+            if np.isfinite(found).all() and rule.of in one.values.keys() & other.values.keys():
+                places = one.values[rule.of] - other.values[rule.of]
+                places = places[np.isfinite(places)]
+                found = np.sqrt(max(found**2, np.mean(places**2))) if places.size else found
             apart[name] = np.where(np.isfinite(first), found, np.nan) if found.ndim else found
     return apart
 

@@ -9,7 +9,9 @@ import numpy as np
 from ringsim.layout.layout import layout_at_opening
 from ringsim.outputs.family import (
     Array,
+    ErrorBar,
     Output,
+    Peak,
     Reading,
     Run,
     Series,
@@ -30,6 +32,8 @@ class PeakAcceleration(Output):
 
     rank = 49
     needs = ("accelerations",)
+    peak = Peak("peak_acceleration_max", ("plane", "corner"), "the largest acceleration")
+    shocks = (("peak_acceleration_max", peak),)
     variables = (
         Variable(
             "peak_acceleration", ("plane", "corner"), "m/s^2",
@@ -37,9 +41,11 @@ class PeakAcceleration(Output):
         ),
         Variable(
             "peak_acceleration_max", (), "m/s^2", "largest acceleration of any corner at any step",
+            error_bar=ErrorBar("largest acceleration", safety=2.5, of="peak_acceleration"),
             summary=("largest acceleration", "10.3g"), worse="larger",
             largest_of="peak_acceleration",
         ),
+        *peak.variables,
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array:
@@ -48,15 +54,10 @@ class PeakAcceleration(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of all steps."""
-        peaks = np.linalg.norm(series.values, axis=3).max(axis=0)
-        rows = in_all_planes(peaks, run.scene.structure.planes)
-        return {"peak_acceleration": rows, "peak_acceleration_max": peaks.max()}
-
-    def shocks(self, run: Run, series: Series) -> dict[str, float]:
-        """When the largest acceleration was."""
-        sizes = np.linalg.norm(series.values, axis=3).reshape(len(series.times), -1)
-        largest = np.nanmax(sizes, axis=1)
-        return {"peak_acceleration_max": float(series.times[largest.argmax()])}
+        sizes = np.linalg.norm(series.values, axis=3)
+        rows = in_all_planes(sizes.max(axis=0), run.scene.structure.planes)
+        values = {"peak_acceleration": rows, "peak_acceleration_max": sizes.max()}
+        return values | self.peak.of(run, series.times, sizes)
 
 
 # Where corners, pins, joints and the hub are.

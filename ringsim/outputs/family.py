@@ -190,7 +190,7 @@ class Peak:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """Whole numbers where the dimension has numbers (-1 if missing), text elsewhere."""
-        types = {"section": "i4", "span": "i4", "winch": "i4"}
+        types = {"section": "i4", "span": "i4", "winch": "i4", "corner": "i4"}
         where = (
             Variable(f"{self.name}_{d}", (), "1", f"{d} of {self.words}", types.get(d, "str"))
             for d in self.dims
@@ -322,6 +322,8 @@ class Output:
     """Variables that tell when and where the value in its summary was."""
     peaks: ClassVar[tuple[Peak, ...]] = ()
     """The same of an output with several such values, whose names these have."""
+    shocks: ClassVar[tuple[tuple[str, Peak], ...]] = ()
+    """Values that the shock of a lock may make, with what tells when they were."""
     limit: ClassVar[str] = ""
     """Field of ``ringsim.parts.solver.Limits`` that its largest reading must not pass."""
     of_antenna: ClassVar[bool] = True
@@ -363,12 +365,6 @@ class Output:
         if len(self.variables) == 2:
             values[self.variables[1].name] = np.abs(series.values).max()
         return values
-
-    def shocks(self, run: Run, series: Series) -> dict[str, float]:
-        """When its numbers were (s) that the shock of a lock may make, by variable; none by
-        default, and of what did not happen.
-        """
-        return {}
 
     def told(self, values: Values, span_names: SpanNames) -> str:
         """When and where the value in its summary was, in words; empty if that is not known."""

@@ -63,7 +63,7 @@ class Asynchrony(Output):
         Variable(
             "asynchrony_max", (), "degree",
             "largest asynchrony up to the deployment time, or to the end of a run without one",
-            error_bar=ErrorBar("largest asynchrony", safety=1.8),
+            error_bar=ErrorBar("largest asynchrony", safety=1.4, of="asynchrony"),
             summary=("largest asynchrony", "10.4f"), worse="larger", largest_of="asynchrony",
             round_off=1e-4,  # sections that are all alike run apart by up to 5e-6 deg
         ),
@@ -210,7 +210,7 @@ class Latching(Output):
         Variable(
             "least_latch_rate", (), "rad/s",
             "smallest opening rate at which a V-joint first met its latch; missing unless all did",
-            error_bar=ErrorBar("least latch rate", safety=3.0),
+            error_bar=ErrorBar("least latch rate", safety=1.6, of="latch_rate"),
             summary=("least latch rate", "10.3g"), worse="smaller", least_of="latch_rate",
         ),
         *LEAST.variables,
@@ -245,7 +245,7 @@ class FastestLatch(Output):
         Variable(
             "peak_latch_rate", (), "rad/s",
             "largest opening rate at which a V-joint first met its latch; missing if none did",
-            error_bar=ErrorBar("largest latch rate", safety=1.7),
+            error_bar=ErrorBar("largest latch rate", safety=1.5, of="latch_rate"),
             summary=("largest latch rate", "10.3g"), worse="larger", largest_of="latch_rate",
         ),
         *LARGEST.variables,
@@ -257,13 +257,6 @@ class FastestLatch(Output):
         return {"peak_latch_rate": np.fmax.reduce(rates, axis=None)} | LARGEST.at(
             run, run.locks, rates
         )
-
-
-def _at_lock(name: str, run: Run, values: Array) -> dict[str, float]:
-    """When the joint locked that has the largest of values, shape (planes, sections)."""
-    if not np.isfinite(values).any():
-        return {}
-    return {name: float(run.locks.flat[int(np.nanargmax(values))])}
 
 
 def missed(values: Values, planes: Sequence[str]) -> str:
@@ -300,6 +293,8 @@ class LockImpulse(Output):
 
     rank = 48
     needs = ("reactions", "stop")
+    peak = Peak("peak_lock_impulse", _PLACE, "the largest lock impulse", "opening_angle")
+    shocks = (("peak_lock_impulse", peak),)
     variables = (
         Variable(
             "lock_impulse", ("plane", "section"), "N m s",
@@ -309,9 +304,10 @@ class LockImpulse(Output):
         Variable(
             "peak_lock_impulse", (), "N m s",
             "largest angular impulse of a stop at a lock; missing if no V-joint has locked",
-            error_bar=ErrorBar("largest lock impulse", safety=1.8),
+            error_bar=ErrorBar("largest lock impulse", safety=1.2, of="lock_impulse"),
             summary=("largest lock impulse", "10.3g"), worse="larger", largest_of="lock_impulse",
         ),
+        *peak.variables,
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
@@ -322,11 +318,8 @@ class LockImpulse(Output):
         """Trapezoids over the steps, which resolve a bounce."""
         found = _impulses(run, series)
         peak = np.fmax.reduce(found, axis=None)  # without a lock NaN
-        return {"lock_impulse": found, "peak_lock_impulse": peak}
-
-    def shocks(self, run: Run, series: Series) -> dict[str, float]:
-        """When the joint locked that took most."""
-        return _at_lock("peak_lock_impulse", run, _impulses(run, series))
+        values = {"lock_impulse": found, "peak_lock_impulse": peak}
+        return values | self.peak.at(run, run.locks, found)
 
 
 def _impulses(run: Run, series: Series) -> Array:

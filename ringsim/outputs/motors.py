@@ -308,9 +308,12 @@ class DriveMargins(Output):
         word = "enough" if margin >= 0.0 else "NOT enough"
         if margin >= 0.0 and values.get("outcome") in (Fate.PARTLY_DEPLOYED, Fate.STALLED):
             word = "enough for rigid rods, in which driven sections open those that are not"
-        plane = float(values.get("least_plane_margin", math.nan))
+        # Before the last winch starts one plane has no drive, as everybody knows who delays it.
+        whole = float(values.get("least_plane_margin", math.nan))
+        plane = float(values.get("least_plane_margin_started", whole))
         also = ", but one plane has" if margin >= 0.0 else ", and one plane even"
-        own = f"{also} {plane:.3f}" if plane < min(margin, 0.0) - 5e-4 else ""
+        # Planes of a ring that sags by a hundredth of a degree are no news; one without drive is.
+        own = f"{also} {plane:.3f}" if plane < min(margin - 5e-3, -5e-4) else ""
         started = float(values.get("least_drive_margin_started", math.nan))
         then = f" ({started:.3f} from the start of the last winch on)" * (started > margin + 5e-4)
         return f"at {angle:.4g} deg and {time:.4g} s: {word}{then}{own}"

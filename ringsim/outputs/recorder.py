@@ -200,10 +200,9 @@ class Recorder(Remembering):
         passed = overloads(self._scene, self.readings, series_of)
         loose = slackened(self._scene, values)
         found = ended(self.status, self.fate, self.reason, passed, loose, coordinates, values)
-        shocks = dict[str, float]()
-        for output in self.readings:
-            if (series := series_of(output)) is not None:
-                shocks |= output.shocks(run, series)
+        shaken = [shock for output in self.readings for shock in output.shocks]
+        times_of = {name: float(values.get(f"{peak.name}_time", np.nan)) for name, peak in shaken}
+        shocks = {name: time for name, time in times_of.items() if np.isfinite(time)}
         told = "" if self.status.failed else unresolved(run, shocks) + jerked(run)
         return replace(found, reason=found.reason + told)
 

@@ -45,7 +45,7 @@ class CableTension(Output):
             "peak_tension", (), "N",
             "largest tension of any span of any cable until all V-joints have locked, or to the "
             "end of a run where latches do not catch",
-            error_bar=ErrorBar("largest tension", safety=1.8),
+            error_bar=ErrorBar("largest tension", safety=2.6),
             summary=("largest tension", "10.3f"), worse="larger", largest_of="cable_tension",
         ),
         *TENSION_PEAK.variables,
@@ -349,6 +349,7 @@ class RodStress(Output):
     rank = 30
     needs = ("stress",)
     peak = STRESS_PEAK
+    shocks = (("peak_rod_stress", peak),)
     limit = "rod_stress"
     coordinates = (Variable("rod", ("rod",), "1", "rod half of a section", "str"),)
     variables = (
@@ -358,7 +359,7 @@ class RodStress(Output):
         ),
         Variable(
             "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod",
-            error_bar=ErrorBar("largest stress", safety=4.0),
+            error_bar=ErrorBar("largest stress", safety=5.0),
             summary=("largest rod stress", "10.4g"), worse="larger", largest_of="rod_stress",
         ),
         *STRESS_PEAK.variables,
@@ -372,11 +373,6 @@ class RodStress(Output):
         """Interpolated, and the largest reading."""
         values, peak = super().reduce(run, series), STRESS_PEAK.of(run, series.times, series.values)
         return values | peak | {"peak_rod_stress": np.nanmax(series.values)}
-
-    def shocks(self, run: Run, series: Series) -> dict[str, float]:
-        """When the largest stress was."""
-        largest = np.nanmax(series.values.reshape(len(series.times), -1), axis=1)
-        return {"peak_rod_stress": float(series.times[largest.argmax()])}
 
 
 # Bending strain of the rod that carries a structure's gauge.

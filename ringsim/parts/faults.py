@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -47,6 +47,8 @@ class Fault(Model):
 
     time: SecondOrZero
     """When it happens, in s of the simulation."""
+    jolts: ClassVar[bool] = True
+    """Whether forces jump when it strikes."""
 
     def laws(self, planes: tuple[str, ...], sections: int) -> list[AngleLaw]:
         """Laws on V-joints that it will switch on."""
@@ -90,6 +92,7 @@ class FailedLatch(JointFault):
     """The latch of a V-joint does not catch from that time on; one that has caught holds on."""
 
     kind: Literal["failed-latch"] = "failed-latch"
+    jolts: ClassVar[bool] = False
 
     def strike(self, now: Struck) -> None:
         """Nothing but that: its pawl is lifted all the same."""
@@ -170,6 +173,7 @@ class FailedSensor(JointFault):
     """
 
     kind: Literal["failed-sensor"] = "failed-sensor"
+    jolts: ClassVar[bool] = False
     shows: Literal["last", "nothing"] = "last"
     """What the controller is shown: the last reading, or that there is none."""
 

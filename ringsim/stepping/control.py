@@ -1,6 +1,7 @@
 """The one place that decides on a run's steps: the next, the repeated, the last."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -67,7 +68,7 @@ class RunControl(Remembering):
         turn: float = math.inf,
         strained: Strained = AS_DRAWN,
         sampled: bool = False,
-        follow_shocks: bool = False,
+        jolts: Sequence[float] | None = None,
     ) -> None:
         """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop and
         their latches have caught, or one is past it by more than ``limits``, or all are at rest,
@@ -75,7 +76,8 @@ class RunControl(Remembering):
         from their mean angle.  No stop that is reached before the time ``turn`` (s), at which loads
         turn round, ends it.  A structure that is not ``strained`` as it was put together does not
         begin.  Steps of a run that is ``sampled`` by a controller are cut at every sample; with
-        ``follow_shocks`` they resolve what locks do to the rods.
+        ``jolts``, times (s) at which forces jump, they resolve what these, the start and locks do
+        to the rods.
         """
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
         self._rest = Rest(start, solver.end_time, scales.energy)
@@ -93,8 +95,9 @@ class RunControl(Remembering):
             if follow_deviations and solver.deviation_tolerance < NO_DEVIATIONS:
                 duration = scales.travel / scales.rate
                 self._deviations = DeviationSteps(solver.deviation_tolerance, duration)
-            if follow_shocks and locks is not None and locks.stops:
-                self._shocks = ShockSteps(solver, scales.period)
+            if jolts is not None and locks is not None and locks.stops:
+                self._shocks = ShockSteps(solver, scales.period, jolts)
+                self._shocks.begin(start)
         self._guard = Guard(solver, scales, strained)
         self._shorter: float | None = None
         self._count, self.repeats, self._settled_at = 0, 0, math.inf
@@ -139,6 +142,8 @@ class RunControl(Remembering):
         """Begin steps and the watch for rest as at the start: other forces act from now on."""
         self._rest.begin(self.now)
         self._steps.begin_anew()
+        if self._shocks is not None:
+            self._shocks.begin(self.now)
 
     def next_step(self, next_event: float = math.inf) -> float:
         """The next step, s; it must not pass the time ``next_event`` (s), as of a fault."""

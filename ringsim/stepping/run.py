@@ -61,6 +61,11 @@ class Events:
         return self.after(time - 2.0 * AT_ONCE) <= time + AT_ONCE
 
 
+def jolts_of(scene: "Scene") -> list[float]:
+    """Times (s) at which forces jump: faults strike, or loads turn round."""
+    return [*(fault.time for fault in scene.faults if fault.jolts), scene.loads_turn_at]
+
+
 # What a run asks of an engine beside the state, which each has in its own form.
 
 
@@ -156,7 +161,7 @@ class Run(Remembering):
             turn=scene.loads_turn_at,
             strained=strained,
             sampled=self._sampler is not None,
-            follow_shocks=scene.record.reactions or scene.record.accelerations,
+            jolts=jolts_of(scene) if scene.record.reactions or scene.record.accelerations else None,
         )
 
     # What an engine gives.

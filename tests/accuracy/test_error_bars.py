@@ -15,7 +15,8 @@ from ringsim.campaign.run import run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
 from ringsim.exudyn import integrate
-from ringsim.outputs.balance import error_bars, refined, rules
+from ringsim.outputs import VARIABLES
+from ringsim.outputs.balance import OF_DIFFERENCE, error_bars, refined, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
@@ -117,6 +118,27 @@ def test_no_bars_without_two_good_runs(which: int) -> None:
     pair = [outcome(4e-4), outcome(1e-4)]
     pair[which] = outcome(1e-4, Status.DIVERGED)
     assert error_bars(*pair) == {}
+
+
+def test_runs_that_agree_by_chance_in_the_largest_have_the_bar_of_their_places() -> None:
+    """The root mean square of the differences, without places that neither run has."""
+    assert all(VARIABLES[rule.of].dims for rule in rules().values() if rule.of)
+    pair = outcome(0.0), outcome(0.0)
+    for each, rates in zip(pair, ([0.1, 0.2, np.nan, 0.4], [0.1, 0.23, np.nan, 0.36]), strict=True):
+        each.values["latch_rate"] = np.array([rates])
+        each.values["least_latch_rate"] = np.array(0.1)
+        each.values["peak_latch_rate"] = np.nanmax(rates)
+    found, rule = error_bars(*pair), rules()["least_latch_rate"]
+    rms = np.sqrt((0.03**2 + 0.04**2) / 3.0)
+    assert found["least_latch_rate_error"] == pytest.approx(rule.safety * OF_DIFFERENCE * rms)
+    # A number that is missing has none, and places that no run has tell nothing.
+    pair[0].values["least_latch_rate"] = np.array(np.nan)
+    assert np.isnan(error_bars(*pair)["least_latch_rate_error"])
+    pair[0].values["least_latch_rate"] = np.array(0.1)
+    pair[0].values["latch_rate"] = np.full((1, 4), np.nan)
+    assert error_bars(*pair)["least_latch_rate_error"] == 0.0
+    safety = rules()["peak_latch_rate"].safety
+    assert found["peak_latch_rate_error"] == pytest.approx(safety * OF_DIFFERENCE * 0.04)
 
 
 def half_open(error: float, locked: int = 1) -> Outcome:

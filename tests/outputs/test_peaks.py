@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 from ringsim.cli import cli
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import BaseReaction
+from ringsim.outputs.corners import PeakAcceleration
 from ringsim.outputs.family import Run, Series, axes
 from ringsim.outputs.joints import Asynchrony
 from ringsim.outputs.motors import DriveMargins
@@ -208,6 +210,42 @@ def test_loads_at_the_base_tell_when_each_was_largest() -> None:
         assert found[f"{name}_time"] == when
         assert BaseReaction().told_of(name, found, {}) == f"at {when:g} s"
     assert BaseReaction().told_of("peak_base_force", {"peak_base_force": 3.0}, {}) == ""
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_impulse_acceleration_and_turn_tell_where_and_when_they_were_largest(fidelity) -> None:
+    """The other places have less; on output times closer than steps the base is there turned most.
+
+    An impulse has the time of its lock.
+    """
+    values = {"record.reactions": True, "record.accelerations": True, "record.interval": 5e-3}
+    values |= {"boom.base": "free", "structure.opening_angle": 170.0, "solver.tolerance": 0.03}
+    run = simulate(load_scene("truss2").with_values(values), fidelity)
+    for name, each, dim in (
+        ("peak_lock_impulse", run.lock_impulse, "section"),
+        ("peak_acceleration_max", run.peak_acceleration, "corner"),
+    ):
+        place = {at: run[f"{name}_{at}"].item() for at in ("plane", dim)}
+        assert each.sel(place).item() == run[name].item() == each.max().item()
+    place = {at: run[f"peak_lock_impulse_{at}"].item() for at in ("plane", "section")}
+    assert run.lock_time.sel(place).item() == run.peak_lock_impulse_time.item()
+    turned = np.sqrt((run.base_rotation**2).sum("axis", skipna=False))
+    near = turned.sel(time=run.base_rotation_max_time, method="nearest").item()
+    assert near == pytest.approx(run.base_rotation_max.item(), rel=1e-3)
+    told = summary({str(name): each.values for name, each in run.variables.items()}, {})
+    when = f" at {run.base_rotation_max_time.item():.4g} s"
+    assert told["base_rotation_max"].endswith(when)
+    assert ", corner " in told["peak_acceleration_max"]
+
+
+def test_an_acceleration_tells_corner_and_time() -> None:
+    """By its magnitude, whatever the largest component."""
+    found = np.random.default_rng(6).uniform(-1.0, 1.0, (9, 2, 3, 3))
+    found[2, 1, 2], found[4, 0, 0, 1] = [3.0, 0.0, -4.0], 4.5
+    run = replace(STILL, coordinates=axes(TRUSS) | {"corner": np.arange(1, 4)})
+    values = PeakAcceleration().reduce(run, Series(TIMES, found, STILL.angles.grid))
+    assert values["peak_acceleration_max"] == values["peak_acceleration"][1, 2] == 5.0
+    assert PeakAcceleration().told(values, {}) == "at 0.5 s: lower, corner 3"
 
 
 def test_the_largest_of_motors_are_told_with_time_and_plane() -> None:

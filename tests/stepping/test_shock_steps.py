@@ -7,9 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from ringsim.cable.ropes import CutCable
+from ringsim.parts.faults import FailedLatch, FailedSensor, FailedSpring
 from ringsim.parts.solver import Solver
+from ringsim.scene import load_scene
 from ringsim.stepping.instant import Energies, Instant
-from ringsim.stepping.repeats import FRONT, GROWTH, ShockSteps
+from ringsim.stepping.repeats import FRONT, GRADE, GROWTH, ShockSteps
+from ringsim.stepping.run import jolts_of
 
 pytestmark = pytest.mark.quick
 
@@ -61,7 +65,7 @@ def test_each_lock_is_met_by_a_short_step_after_ever_shorter_ones(
     for begin, step in zip(times, steps, strict=False):
         if begin + step < locks[0] and step > SHORT * (1.0 + 1e-6):
             assert step < 0.75 * (locks[0] - begin)
-    assert len(steps) < 6.0 / LONG + 45 * len(locks)
+    assert len(steps) < 6.0 / LONG + 90 * len(locks)
     assert repeats <= 6 * len(locks)
 
 
@@ -70,8 +74,36 @@ def test_steps_grow_with_the_time_since_the_lock() -> None:
     steps = np.diff(times)
     for begin, step in zip(times, steps, strict=False):
         if 3.0 + SHORT < begin < 3.0 + PERIOD:
-            assert step <= max(SHORT, (begin - 3.0) / 4.0) * (1.0 + 1e-6)
+            assert step <= max(SHORT, (begin - 3.0) / GRADE) * (1.0 + 1e-6)
     assert steps[-1] == pytest.approx(LONG)
+
+
+def test_they_are_short_where_forces_jump() -> None:
+    """At the start, and at a time at which a step ends; as behind a lock."""
+    never = np.array([math.inf])
+    shocks = ShockSteps(SOLVER, PERIOD, [0.5])
+    assert shocks.limit == math.inf
+    shocks.begin(state(0.0, never, 0.1))
+    assert shocks.limit == pytest.approx(SHORT)
+    for time, limit in (
+        (0.8 * PERIOD, max(SHORT, 0.8 * PERIOD / GRADE)), (1.1 * PERIOD, math.inf),
+        (0.4999, math.inf), (0.5, SHORT), (0.5 + 0.9 * PERIOD, 0.9 * PERIOD / GRADE),
+    ):  # fmt: skip
+        shocks.accept(state(time, never, 0.1), locked=False)
+        assert shocks.limit == pytest.approx(limit), time
+
+
+def test_faults_that_change_no_force_shake_nothing() -> None:
+    kinds = {fault: fault.jolts for fault in (FailedLatch, FailedSensor, FailedSpring, CutCable)}
+    assert [*kinds.values()] == [False, False, True, True]
+    scene = load_scene("ring18-ground").with_values({
+        "faults": [
+            {"kind": "failed-latch", "time": 1.0, "plane": "upper", "section": 2},
+            {"kind": "cut-cable", "time": 2.0, "cable": "upper", "span": 3},
+        ]
+    })  # fmt: skip
+    assert jolts_of(scene)[0] == 2.0
+    assert 1.0 not in jolts_of(scene)
 
 
 def test_they_are_shorter_at_a_finer_tolerance() -> None:
