@@ -186,6 +186,29 @@ def late_line(campaign: xr.Dataset) -> str:
     return f"{line}; from then on all have at least {later[k]:.4g} ({where})"
 
 
+def plane_line(campaign: xr.Dataset) -> str:
+    """The least drive margin of one plane's own cable, where it is less than the least of both
+    together; empty if it is not.  From the start of the last winch on where one starts late: before
+    it one plane has no drive.
+    """
+    late = "_started" if np.isfinite(numbers(campaign, "least_plane_margin_started")).any() else ""
+    both, own = (numbers(campaign, f"least_{of}_margin{late}") for of in ("drive", "plane"))
+    held = good(campaign) & np.isfinite(both) & np.isfinite(own)
+    if not held.any():
+        return ""
+    least, whole = own[held].min(), both[held].min()
+    if not least < whole - 5e-3:  # planes of a ring that sags a little are no news
+        return ""
+    k, short = int(np.argmin(np.where(held, own, np.inf))), int((own[held] < 0.0).sum())
+    word = f"NOT enough in {_of(short, int(held.sum()))}" if short else "enough"
+    sample = int(campaign["sample"][k])
+    then = " from the start of the last winch on" * bool(late)
+    return (
+        f"the least drive margin of one plane's own cable{then} is {least:.3f} (sample {sample}): "
+        f"{word}"
+    )
+
+
 def records_line(campaign: xr.Dataset, names: Collection[str] = ()) -> str:
     """Which of a campaign's own outputs, by default of all, are of records alone, and how far these
     are apart; empty if none is.
@@ -270,6 +293,8 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 error += _checked(worst, variable)
                 name = variable.summary[0] + DOUBT * (f'"{variable.name}"' in says.get(OFF, ""))
                 lines.append(f"{name} in sample {sample}: {said}{error}{mark}")
+    # Not again where the worst sample of both is that of the plane.
+    lines += [told for told in [plane_line(sound)] if told and not _has_been_told(lines, told)]
     if unknown:
         lines.append(
             "no sample has numerical error bars: set error_bars_every in the campaign file, or run "
@@ -277,6 +302,11 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
             "run one.toml --set solver.error_bars=true"
         )
     return [*lines, *filter(None, [off_note(says)])]
+
+
+def _has_been_told(lines: list[str], told: str) -> bool:
+    number = told.partition(" is ")[2].partition(" (")[0]
+    return any("one plane" in line and line.rpartition(number)[1] for line in lines)
 
 
 def _checked(worst: xr.Dataset, variable: Variable) -> str:
@@ -378,8 +408,8 @@ DOUBTED = f"{DOUBT.strip()} may be off, since steps are too long at locks"
 """What is said below a table with that mark."""
 OFF = "may_be_off"
 """Attribute of an analysis with what ``off_note`` tells, as JSON."""
-LATE = "late_winches"
-"""Attribute with ``late_line``."""
+LATE, PLANE = "late_winches", "plane_margin"
+"""Attributes with ``late_line`` and ``plane_line``."""
 RECORDED = "of_records"
 """Attribute of an analysis with ``records_line``."""
 
@@ -468,8 +498,13 @@ def attributes(campaign: xr.Dataset) -> dict[str, str]:
     counts = {name: int(own.sum()) for name, own in found.items()}
     counts = dict(sorted(counts.items(), key=lambda each: -each[1]))
     told = {"samples": counts, "of": int(good(campaign).sum()), "cure": cure}
-    marks = {NOTE: losses(campaign).note, LATE: late_line(campaign)}
+    marks = {NOTE: losses(campaign).note, LATE: late_line(campaign), PLANE: plane_line(campaign)}
     return marks | ({OFF: json.dumps(told)} if counts else {})
+
+
+def drive_notes(says: Mapping[Any, Any]) -> list[str]:
+    """What is told beside the least drive margin, out of ``attributes``."""
+    return [told for each in (LATE, PLANE) if (told := says.get(each))]
 
 
 def off_counts(says: Mapping[Any, Any]) -> dict[str, str]:

@@ -28,7 +28,9 @@ from ringsim.analysis.design import (
 from ringsim.analysis.indices import centred_ranks, correlations
 from ringsim.analysis.intervals import (
     NONE,
+    TWIN,
     Mask,
+    Twins,
     difference_of_pairs,
     difference_of_shares,
     good,
@@ -297,12 +299,17 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             NOTE: "; ".join(f"{side}: {each}" for side, each in notes.items() if each),
         },
     )  # fmt: skip
-    wanted = [required_by(each.attrs) for each in (first, second)]
+    wanted, twins = [required_by(each.attrs) for each in (first, second)], Twins()
     for name in quantities():
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
             if f"{name}_difference" in found:
                 found[f"{name}_difference"].attrs[BADNESS] = badness_of(name, *wanted)
+                twin = twins.of(
+                    name, np.concatenate([numbers(each, name)[good(each)] for each in (one, other)])
+                )
+                if twin and not any(name in each for each in wanted):
+                    found[f"{name}_difference"].attrs[TWIN] = twin
     for side, mine, its in zip(SIDES, (first, second), (second, first), strict=True):
         only = (name for name in quantities() if name in mine and name not in its)
         found.attrs[f"only_{side}"] = ", ".join(only)

@@ -8,7 +8,7 @@ import xarray as xr
 from ringsim.analysis.campaign_notes import NOTE, marked
 from ringsim.analysis.comparison import BADNESS
 from ringsim.analysis.indices import largest_by_chance
-from ringsim.analysis.intervals import NOTHING, all_alike, is_moment, quantities
+from ringsim.analysis.intervals import NOTHING, TWIN, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section
 from ringsim.outputs.base import DOUBT
 from ringsim.tables import (
@@ -288,7 +288,10 @@ def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
         size = float(np.sqrt(np.nansum(errors**2)))
         if _within(found, name):
             factor, unit = readable(quantities()[name].units, size)
-            within.append(f"{name} ({with_unit(number_text(factor * size, 2), unit)})")
+            sides = zip(names_of(found), np.isfinite(errors), strict=True)
+            of = [f", of {side} alone" for side, has in sides if has]
+            words = with_unit(number_text(factor * size, 2), unit) + of[0] * (len(of) == 1)
+            within.append(f"{name} ({words})")
     if not names:
         return []
     if not known:
@@ -296,7 +299,17 @@ def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
     told = "differences within the numerical errors (root sum of squares of the error bars of both)"
     alone = "intervals are of sampling alone; " * (not found.attrs["runs"])
     return [f"{told}: {', '.join(within)}"] * bool(within) + [
-        f"{alone}numerical errors that both share cancel, others add"
+        f"{alone}numerical errors that both share cancel, others add",
+        *_without_bars(found, every),
+    ]
+
+
+def _without_bars(found: xr.Dataset, every: Sequence[xr.DataArray]) -> list[str]:
+    """The side of which no error is known, where the other one has some."""
+    return [
+        f"{name} has no error bars (error_bars_every): its numerical errors are not counted"
+        for side, name in enumerate(names_of(found))
+        if not any(np.isfinite(each.values[side]) for each in every)
     ]
 
 
@@ -320,7 +333,7 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
     """Means of both, their difference with its interval, and the pair that differs most; and the
     outputs of which a note says that they neither differ nor scatter by what tables tell.
     """
-    rows, alike, flat = [], list[str](), dict[str, str]()
+    rows, alike, again, flat = [], list[str](), list[str](), dict[str, str]()
     for name, variable in quantities().items():
         if f"{name}_difference" not in found or is_moment(name):
             continue
@@ -356,6 +369,9 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
             place = str(found[f"{name}_largest_difference_sample"].item())
             rank = found[f"{name}_rank_correlation"].item()
             together = "-" if np.isnan(rank) else f"{rank:+.2f}"
+        if twin := found[f"{name}_difference"].attrs.get(TWIN):
+            again.append(f"{name} is {twin}")
+            continue
         fine = digits_of(min(first, second), max(first, second))
         rows.append((
             name, unit_text(unit),
@@ -374,6 +390,7 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
     columns = 8 if found.attrs["runs"] else len(head)
     same = "the same in both" if found.attrs["runs"] else "the same in each pair"
     notes = [f"{same}: {', '.join(alike)}"] * bool(alike) + _numerical(found, [r[0] for r in rows])
+    notes += [f"in all samples of both {', '.join(again)}"] * bool(again)
     named = ", ".join(flat.values())
     notes += [f"differences and scatter below {100 * _ALIKE:g} %: {named}"] * bool(flat)
     for name, side in zip(names_of(found), ("first", "second"), strict=True):

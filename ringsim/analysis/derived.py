@@ -467,7 +467,15 @@ def _value(node: ast.expr, known: Mapping[str, xr.DataArray]) -> Any:
             (values,), dims = several, _over(node, _tell(node.args[0]))
             if not all(values.sizes[dim] for dim in dims):  # a place that this run does not have
                 return values.sum(dims, min_count=1)
-            return _REDUCTIONS[name](values, dims)
+            found = _REDUCTIONS[name](values, dims)
+            read = {n.id for n in ast.walk(node.args[0]) if isinstance(n, ast.Name)} & known.keys()
+            # A joint without a value did not lock: what all of them would tell, it does not have.
+            # Elsewhere a missing value is a place that there is not, or a time behind the end.
+            of_joints = {*values.dims} <= {"sample", "plane", "section"} and any(
+                VARIABLES[each].dims == ("plane", "section") for each in read
+            )
+            whole = values.notnull().all([each for each in values.dims if each not in found.dims])
+            return found.where(whole) if of_joints else found
         case ast.Call(func=ast.Name(id=name)):
             values = known[name]
             for dim, wanted in _selection(node, VARIABLES[name].dims):

@@ -21,8 +21,16 @@ from ringsim.analysis.design import (
     short_of_goal,
 )
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
-from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used, varies
-from ringsim.analysis.requirements import Requirement, violations
+from ringsim.analysis.intervals import (
+    Mask,
+    good,
+    lost,
+    numbers,
+    quantities,
+    used,
+    varies,
+)
+from ringsim.analysis.requirements import Requirement, violations, without_twins
 from ringsim.analysis.tails import subset_simulation
 from ringsim.refusal import InputError
 from ringsim.stepping.instant import Array
@@ -202,7 +210,7 @@ def influence(
     found: dict[str, Any] = {}
     index, ok = campaign["sample"].to_numpy(), good(campaign)
     columns, last = indices.Columns(inputs.values), np.ones(len(ok), dtype=bool)
-    for name in quantities():
+    for name in without_twins(campaign, quantities(), requirements):
         values = numbers(campaign, name)
         known = ok & np.isfinite(values)
         if known.sum() < LEAST or not varies(campaign, name):

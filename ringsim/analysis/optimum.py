@@ -508,7 +508,7 @@ def course(problem: Problem) -> Course:
     if not np.isfinite(found.judged[0].parts).all():
         return found
     yield from archive.check(0)
-    each = problem.designs // problem.front
+    each = (problem.designs - 1) // problem.front  # the present one is of them
     later = int(_SHARE_LATER * each)
     for which in range(len(problem.objectives)):
         yield from _search(archive, each - later, which)

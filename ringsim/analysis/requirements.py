@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
-from ringsim.analysis.intervals import Mask, good, numbers, quantities, tells_of
+from ringsim.analysis.intervals import Mask, Twins, good, numbers, quantities, tells_of
 from ringsim.outputs import VARIABLES
 from ringsim.outputs.balance import instead_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
@@ -182,6 +182,19 @@ def read_requirements(table: Mapping[str, Any], source: str) -> dict[str, Requir
 def required_by(attributes: Mapping[Any, Any]) -> dict[str, Requirement]:
     """The requirements that a design or a merged campaign keeps; none without any."""
     return read_requirements(json.loads(attributes.get("requirements", "{}")), "requirements")
+
+
+def without_twins(
+    campaign: xr.Dataset, names: Iterable[str], wanted: Collection[str] = ()
+) -> list[str]:
+    """Outputs of which none repeats another one in all samples, unless it is ``wanted`` or required
+    by the campaign; of two those are left, or else those that are in summaries.
+    """
+    wanted, names = {*required_by(campaign.attrs), *wanted}, [*names]
+    twins, held, known = Twins(), good(campaign), quantities()
+    order = sorted(names, key=lambda name: (name not in wanted, known[name].summary is None))
+    again = {name for name in order if twins.of(name, numbers(campaign, name)[held])}
+    return [name for name in names if name not in again - wanted]
 
 
 def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:

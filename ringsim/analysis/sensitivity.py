@@ -43,7 +43,7 @@ from ringsim.analysis.intervals import (
     share_bounds,
     varies,
 )
-from ringsim.analysis.requirements import Requirement, violations
+from ringsim.analysis.requirements import Requirement, violations, without_twins
 from ringsim.analysis.reweighting import (
     LEAST_OF_SHARE,
     LEAST_REPLICATES,
@@ -98,17 +98,16 @@ ABOUT = {
 def responses(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement]
 ) -> dict[str, tuple[Array, str]]:
-    """Outputs that vary beyond their numerical error, NaN where missing, with units; then failures
-    and violations, 0 or 1.
-    """
+    """Outputs that vary beyond numerical errors, with units; failures and violations, 0 or 1."""
     ok, found = good(campaign), dict[str, tuple[Array, str]]()
     # Of blocks the samples whose variance the indices share out.
     population = population_of(campaign)
     stand = np.isin(campaign["sample"].to_numpy(), population["sample"].to_numpy())
-    for name, variable in quantities().items():
+    for name in without_twins(campaign, quantities(), requirements):
         if varies(population, name):
             values = numbers(campaign, name)
-            found[name] = np.where(ok & np.isfinite(values), values, np.nan), variable.units
+            values = np.where(ok & np.isfinite(values), values, np.nan)
+            found[name] = values, quantities()[name].units
     for name, (own, of) in groups_of(campaign, requirements).items():
         own_drawn, of_drawn = own[stand], of[stand]
         if min(own_drawn.sum(), (of_drawn & ~own_drawn).sum()) >= _LEAST_OF_A_KIND:

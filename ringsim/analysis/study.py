@@ -39,7 +39,9 @@ from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import (
     CHECKED,
     NONE,
+    TWIN,
     Interval,
+    Twins,
     good,
     lost,
     numbers,
@@ -225,33 +227,14 @@ def statistics(
     ``wanted``, by default by the campaign, tells worst samples where the output does not.
     """
     wanted = required_by(campaign.attrs) if wanted is None else wanted
-    found, seen = dict[str, Any](), dict[str, list[tuple[str, Array]]]()
+    found, twins = dict[str, Any](), Twins()
     for name in quantities() if names is None else names:
         values = numbers(campaign, name)[good(campaign)] if name in campaign else np.empty(0)
         if np.isfinite(values).any():
             found |= _output(campaign, name, placed, badness_of(name, wanted))
-            others = seen.setdefault(quantities()[name].units, [])
-            twin = next((other for other, own in others if _equal(own, values)), "")
-            if twin:
+            if twin := twins.of(name, values):
                 found[name][2][TWIN] = twin
-            else:
-                others.append((name, values))
     return found
-
-
-TWIN = "same_as"
-"""Attribute of an output that has the values of another one in all samples."""
-
-
-def _equal(first: Array, second: Array) -> bool:
-    """Whether two outputs are the same in all samples, but for round-off; cheaply if they are not,
-    as most differ in the first few.
-    """
-    few = slice(0, 8)
-    return all(
-        np.allclose(first[part], second[part], rtol=1e-9, atol=0.0, equal_nan=True)
-        for part in (few, slice(None))
-    )
 
 
 def _output(campaign: xr.Dataset, name: str, placed: Placement, badness: int) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from ringsim.analysis.intervals import (
     LEAST_OF_BOOTSTRAP,
     NOTHING,
     ONE_DECIDES,
+    TWIN,
     all_alike,
     hardly_apart,
     is_moment,
@@ -49,7 +50,7 @@ from ringsim.analysis.reweighting import (
     SOBOL,
 )
 from ringsim.analysis.sensitivity import rarer_table, refusals
-from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, TWIN, statistics
+from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import (
     BOUND,

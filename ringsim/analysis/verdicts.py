@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim.analysis.campaign_notes import (
-    LATE,
     bars_of,
     doubtful,
+    drive_notes,
     marked,
     slow_latches,
     uncertain_latches,
@@ -498,8 +498,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         signs = [kind.key for kind in KINDS if f" {kind.sign} " in one["requirement_text"]]
         if doubt := doubt_of(name, signs):
             notes.append(f"{one['requirement_text']}: {doubt}")
-        if (late := analysis.attrs.get(LATE)) and name == "least_drive_margin":
-            notes.append(f"{name}: {late}")
+        if name == "least_drive_margin":
+            notes += [f"{name}: {each}" for each in drive_notes(analysis.attrs)]
         if missing := one["samples_without_value"]:
             notes.append(
                 f"{name}: violations without a value (the antenna did not get that far): {missing}"

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import doubted, late_line, marked
+from ringsim.analysis.campaign_notes import doubted, late_line, marked, plane_line
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -415,7 +415,7 @@ def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
 
 
 _SLACK = ("slack_duration", "longest_slack")
-_DRIVE = "least_drive_margin"
+_DRIVE, _PLANE = "least_drive_margin", "least_plane_margin"
 _AT_ONCE = 64
 """Samples whose series are read at once."""
 
@@ -440,7 +440,9 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         known = good(campaign) & np.isfinite(values)  # ropes that never were slack have 0 s of it
         counts = int((known & (values > allowed)).sum()), int(known.sum())
         rows.append((told, peak, of, float(ratio[k]), float(values[k]), k, *counts))
-    for name in (_DRIVE, *[f"{_DRIVE}_started"] * bool(late_line(campaign))):
+    late, own = bool(late_line(campaign)), plane_line(campaign)
+    plane = f"{_PLANE}_started" if "from the start" in own else _PLANE
+    for name in (_DRIVE, *[f"{_DRIVE}_started"] * late, *[plane] * bool(own)):
         least = np.where(good(campaign), numbers(campaign, name), np.nan)
         if np.isfinite(least).any():
             k = int(np.nanargmin(least))
@@ -520,8 +522,8 @@ def margin_table(analysis: xr.Dataset) -> Table:
     notes = [
         "margin: limit / worst value - 1, of all samples and the whole run; with a factor of "
         "safety F it is (1 + margin) / F - 1"
-        + (f"; {_DRIVE} is a margin already, with the factors of its standard")
-        * any(of.startswith(_DRIVE) for _, of, *_ in rows)
-    ] * any(not of.startswith(_DRIVE) for _, of, *_ in rows)
+        + "; that of the drive is one already, with the factors of its standard"
+        * any(of.startswith((_DRIVE, _PLANE)) for _, of, *_ in rows)
+    ] * any(not of.startswith((_DRIVE, _PLANE)) for _, of, *_ in rows)
     head = ("limit", "of", "worst value", "margin", "in sample", "samples beyond")
     return marked(Table(head, rows, notes, left=2), analysis, 2)

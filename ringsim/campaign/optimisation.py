@@ -317,8 +317,7 @@ class _Course:
     found: Found | None = None
     verdicts: list[tuple[str, Array]] = field(default_factory=list)
     """Designs that are judged, by the names of their folders."""
-    tried: int = 0
-    """Designs that have been ordered so far."""
+    tried: int = 0  # designs that have been ordered so far
 
     def order(self) -> Order:
         """The next campaign, from the results of those before."""
@@ -428,18 +427,19 @@ class _Course:
 
 
 def first_order(given: Given) -> tuple[Order, int, int, str]:
-    """The verdict on the present design, which stands for all; about how many runs there are (how
-    many rounds of checks nobody knows), and how many by the other engine; the runs in words.
+    """The verdict on the present design, for all; about how many runs there are (rounds of checks
+    nobody knows), and how many by the other engine; the runs in words.
     """
     budget, chosen = given.budget, given.problem.front
     every = given.present.specification.check_every
+    checks = -(-budget.verdict // every) if every else 0
     parts = (
-        (budget.designs + chosen * len(budget.variables), budget.samples, "designs searched"),
+        (budget.designs, budget.samples, "designs searched"),
+        (chosen * len(budget.variables), budget.samples, "with one value as at present"),
         (1 + 2 * chosen, budget.check, "checks"), (1 + chosen, budget.verdict, "verdicts"),
     )  # fmt: skip
-    runs = sum(count * samples for count, samples, _ in parts)
     told = " + ".join(f"{count} {what} x {samples}" for count, samples, what in parts)
-    checks = -(-budget.verdict // every) if every else 0
+    runs = sum(count * samples for count, samples, _ in parts)
     return Order(given.present, Path()), runs, (1 + chosen) * checks, told
 
 

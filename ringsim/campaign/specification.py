@@ -439,6 +439,13 @@ def campaign_of(
         raise InputError(explain(error, Specification, path.name)) from None
     specification.set.update(settings or {})
     for name, value in (settings or {}).items():
+        own_key = re.split(r"[.\[]", name)[0].strip("\"'")
+        if own_key in Specification.model_fields.keys() - Scene.model_fields.keys():
+            cure = " (or say --samples)" * (own_key == "design")
+            raise InputError(
+                f"{path.name}: --set {name}: {own_key} is a key of the campaign file: change it "
+                f"there{cure}; --set changes values of the scene"
+            )
         text += f"\n# called with --set {name} = {json.dumps(value, default=str)}"
     key = "scene"
     try:

@@ -256,7 +256,11 @@ def changed(new: Arrays, old: Arrays) -> list[str]:
         # Of margins, which may be negative, no share tells anything.
         apart = before > 0.0 and np.isfinite(after) and before != after
         more = f" ({100.0 * (after / before - 1.0):+.2g} %)" if apart else ""
-        values = " -> ".join(with_unit(f"{v:.5g}", variable.units) for v in (before, after))
+        bars = (float(each.get(f"{name}_error", np.nan)) for each in (old, new))
+        values = " -> ".join(
+            with_unit(f"{value:.5g}" + f" +- {bar:.2g}" * bool(np.isfinite(bar)), variable.units)
+            for value, bar in zip((before, after), bars, strict=True)
+        )
         lines.append(f"{variable.summary[0]:<24} {values}{more}")
     return lines
 

@@ -365,6 +365,8 @@ def compare_command(
     """
     require_with("--pdf", pdf or None, "--report", page is not None)
     if out is not None:
+        if out.suffix == ".html":
+            raise InputError(f"--out {out}: it writes netCDF; the page is --report {out}")
         require_file(out)
     if second.suffix == ".toml":
         if page is not None:

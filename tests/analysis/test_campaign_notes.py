@@ -11,7 +11,13 @@ import xarray as xr
 from made_campaign import made_campaign
 from matplotlib.text import Text
 
-from ringsim.analysis.campaign_notes import late_line, peak_lines, reached_by_words, remark_lines
+from ringsim.analysis.campaign_notes import (
+    late_line,
+    peak_lines,
+    plane_line,
+    reached_by_words,
+    remark_lines,
+)
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import not_met, statistics_table
 from ringsim.analysis.study_text import told as all_told
@@ -267,6 +273,44 @@ def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> Non
     made[name] = made["least_drive_margin"]
     assert late_line(made) == ""
     assert name not in str(margin_table(analyse(made)).rows)
+
+
+def test_a_plane_whose_own_cable_has_less_is_told_beside_the_margin_of_both() -> None:
+    """Of all samples: the one with the least margin of both need not be the one with the least of
+    a plane.
+    """
+    made = made_campaign(5, failed=(4,))
+    made["least_drive_margin"] = "sample", np.array([0.3, 0.172, 0.5, 0.4, -0.9])
+    made["least_plane_margin"] = "sample", np.array([0.2, 0.120, -0.006, 0.4, -1.0])
+    line = "the least drive margin of one plane's own cable is -0.006 (sample 2): "
+    assert plane_line(made) == f"{line}NOT enough in 1 of 4 samples"
+    analysis = analyse(
+        made, {"least_drive_margin": {"min": 0.0, "probability": 0.5, "confidence": 0.5}}
+    )
+    assert f"least_drive_margin: {plane_line(made)}" in verdict_table(analysis).notes
+    rows = {row[0]: row[1:] for row in margin_table(analysis).rows}
+    assert rows["least_drive_margin >= 0"][1:] == ("0.172", "+0.172", "1", "0 of 4")
+    assert rows["least_plane_margin >= 0"][1:] == ("-0.006", "-0.006: NOT enough", "2", "1 of 4")
+    assert plane_line(made) in peak_lines(made)
+    made["least_plane_margin"] = made["least_drive_margin"] - 4e-3
+    assert plane_line(made) == ""
+    assert "least_plane_margin >= 0" not in str(margin_table(analyse(made)).rows)
+    made["least_plane_margin"] = made["least_drive_margin"] - 0.1
+    assert plane_line(made).endswith("is 0.072 (sample 1): enough")
+    # Before the last winch starts one plane has no drive, which is nothing wrong.
+    made["least_plane_margin"] = made["least_drive_margin"] * 0.0 - 0.957
+    made["least_drive_margin_started"] = made["least_drive_margin"] + 2.0
+    made["least_plane_margin_started"] = made["least_drive_margin_started"]
+    made["least_drive_margin_started_angle"] = made["least_drive_margin"] * 0.0 + 14.0
+    assert plane_line(made) == ""
+    assert not any("one plane" in line for line in peak_lines(made))
+    assert "least_plane_margin" not in str(margin_table(analyse(made)).rows)
+    made["least_plane_margin_started"] = made["least_drive_margin_started"] - 2.2
+    assert "own cable from the start of the last winch on is -0.028 (sample 1): NOT" in (
+        plane_line(made)
+    )
+    rows = {row[0]: row[1:] for row in margin_table(analyse(made)).rows}
+    assert rows["least_plane_margin_started >= 0"][-1] == "1 of 4"
 
 
 def test_an_output_that_another_repeats_is_named_instead_of_told_twice() -> None:

@@ -104,6 +104,13 @@ def test_differences_within_the_numerical_errors_are_named():
     )
     said += "asynchrony_max (0.42"
     assert [any(x.startswith(said) for x in lines) for lines in told] == [True, False]
+    # One that has none adds nothing, which is said.
+    lines = compared(compare(both[0], seeded(VALUES + 0.1)))
+    assert any(x.startswith(f"{said[:-5]}(0.3 deg, of first alone)") for x in lines)
+    lacks = "second has no error bars (error_bars_every): its numerical errors are not counted"
+    assert lacks in lines
+    assert lacks in told[1]
+    assert not any("no error bars" in x for x in told[0])
     # What the bars of both may have made is worse in neither; beyond one bar alone it is.
     rows = [next(x for x in lines if x.startswith("asynchrony_max ")) for lines in told]
     assert ["  second  " in f"{row}  " for row in rows] == [False, True], rows
@@ -119,6 +126,23 @@ def test_outputs_that_one_has_alone_are_named():
         sum(line.startswith("in first alone: ") and "peak_tension" in line for line in lines) == 1
     )
     assert not any("alone" in line for line in compared(compare(own, own)))
+
+
+def test_outputs_that_are_the_same_in_all_samples_are_one_row():
+    """In both: where one sample differs, both rows stand."""
+    names = "least_drive_margin", "least_drive_margin_started"
+    one, other = (
+        seeded(each).assign(dict.fromkeys(names, ("sample", 3.0 - each)))
+        for each in (VALUES, SHIFTED)
+    )
+    told = "least_drive_margin_started is least_drive_margin"
+    lines = compared(compare(one, other))
+    assert sum(line.startswith("least_drive_margin_started ") for line in lines) == 0
+    assert f"in all samples of both {told}" in lines
+    other[names[1]] = other[names[1]] + 0.1 * (np.arange(COUNT) == COUNT // 2)
+    lines = compared(compare(one, other))
+    assert sum(line.startswith("least_drive_margin_started ") for line in lines) == 1
+    assert not any(told in line for line in lines)
 
 
 def test_settings_of_the_solver_are_no_inputs_that_differ():

@@ -147,6 +147,21 @@ def test_values_are_those_of_numpy(text: str) -> None:
 
 
 @pytest.mark.quick
+def test_numbers_of_several_joints_need_all_of_them() -> None:
+    """A joint without a time did not lock; those of the other plane may have."""
+    arrays, axes = stored()
+    arrays["lock_time"][1, 1, 2] = np.nan
+    for text in ("difference(lock_time)", "max(lock_time)", "mean(lock_time) / 2",
+                 "sum(lock_time < 0.5)", "max(difference(lock_time, over='plane'))",
+                 "max(lock_time * peak_tension)", "argmax(lock_time, over='section')"):  # fmt: skip
+        found = over_samples({"x": Derived(of=text)}, arrays, axes)["x"]
+        assert np.isfinite(found).tolist() == [True, False, True, True], text
+    for text in ("difference(lock_time(plane='upper'))", "max(lock_time(section=(1, 2)))"):
+        found = over_samples({"x": Derived(of=text)}, arrays, axes)["x"]
+        assert np.isfinite(found).all(), text
+
+
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("text", "unit"),
     [("max(cable_tension)", "N"), ("argmax(asynchrony)", "s"), ("max(lock_time) * 2", "s"),

@@ -114,8 +114,9 @@ def test_cost_is_told_before_anything_runs(file, tmp_path, monkeypatch):
     assert told.exit_code == 0
     assert not list(tmp_path.iterdir())
     least = (table["designs"] + 1) * table["samples"] + 3 * table["check"] + 2 * 30
-    sums = (f"{table['designs'] + 1} designs searched x {table['samples']} + 3 checks x "
-            f"{table['check']} + 2 verdicts x 30")  # fmt: skip
+    sums = (f"{table['designs']} designs searched x {table['samples']} + 1 with one value as at "
+            f"present x {table['samples']} + 3 checks x {table['check']} + "
+            "2 verdicts x 30")  # fmt: skip
     assert f"about {least} runs ({sums}), " in told.stdout
     assert "predicted      about" in told.stdout
     assert "full engine" not in told.stdout
