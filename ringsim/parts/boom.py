@@ -26,7 +26,7 @@ class Boom(Model):
     base: Literal["free", "fixed"] = "free"
     """free: the ring floats with its boom; fixed: the boom's upper end is clamped."""
     length: Metre = 0.9
-    """Length of the tube, at least the height of the stowed ring."""
+    """Length of the tube, at least that of a diagonal: the height of a ring folded wholly."""
     tube: Tube = Tube(outer_diameter=0.06, inner_diameter=0.058)
     """Cross-section."""
     density: Density = 1800.0

@@ -47,6 +47,9 @@ _LOOKS = ((style.BLUE, "-"), (style.ORANGE, (0, (5, 1.5))))
 """Colour and dashes of either: dashes tell them apart in grey."""
 _WIDE = 40
 """Letters of a title above a panel."""
+_PANELS = 12
+"""Numbers with a panel of their own at most, those with requirements first: more do not fit a page
+in the size in which they are read."""
 _RECORDS = 301
 """Times of a course at most: more than a figure resolves, and all samples are read at each."""
 _COURSES = {
@@ -79,14 +82,17 @@ def _figures(
         both, _ = samples_of(first, second)
         known = {name for each in both for name in drawable(each)}
         every = [n for n in differing(found) if n in known]
-        names = [n for n in every if not _still(both, n)] or every
-        unmoved = [n for n in every if n not in names]
+        moved = [n for n in every if not _still(both, n)] or every
+        unmoved = [n for n in every if n not in moved]
+        required = [n for n in moved if any(limits(each, n) for each in both)]
+        names = [*required, *(n for n in moved if n not in required)][:_PANELS]
+        left = [n for n in moved if n not in names]
         if names and found.attrs["pairs"]:
             words = "How far the samples of each pair differ"
-            yield "differences", words, _noted(pairs(found, both, names), unmoved)
+            yield "differences", words, _noted(pairs(found, both, names), unmoved, left)
         if names:
             words = "Distribution of each main number in both"
-            yield "values", words, _noted(values(found, both, names), unmoved)
+            yield "values", words, _noted(values(found, both, names), unmoved, left)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
     until, lines = _until(both)[0], _lines_of(both)
     drawn = {
@@ -105,12 +111,17 @@ def _still(both: Both, name: str) -> bool:
     return bool(every.size) and not wanted and hardly_apart(every.min(), every.max())
 
 
-def _noted(figure: Figure, unmoved: list[str]) -> Figure:
+def _noted(figure: Figure, unmoved: list[str], left: list[str]) -> Figure:
     """A figure that says below its panels which numbers have none."""
+    words = []
     if unmoved:
-        words = f"Not drawn, because samples differ by less than {100 * ALIKE:g} %: "
-        words = textwrap.fill(words + ", ".join(unmoved), int(12.0 * figure.get_figwidth()))
-        figure.legends[0].set_title(words)
+        still = f"Not drawn, because samples differ by less than {100 * ALIKE:g} %: "
+        words.append(still + ", ".join(unmoved))
+    if left:
+        words.append(f"In the table alone: {', '.join(left)}")
+    if words:
+        wide = int(12.0 * figure.get_figwidth())
+        figure.legends[0].set_title("\n".join(textwrap.fill(each, wide) for each in words))
         figure.legends[0].get_title().set_fontsize(9)
     return figure
 

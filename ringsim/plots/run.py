@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from ringsim.outputs.family import Array
 from ringsim.plots import jointed, picture, style
-from ringsim.tables import known_to, unit_text, with_unit
+from ringsim.tables import known_to, number_text, unit_text, with_unit
 
 # The largest value of a run as a point of what is drawn: records stand at fixed times, so that
 # campaigns have one time axis, and a peak seldom falls on one.  Its value, time and place are
@@ -52,7 +52,9 @@ class Peak(NamedTuple):
         near = float(np.interp(self.time, time, values.to_numpy()))
         if len(time) < 2 or abs(near - self.value) <= _ON_CURVE * abs(self.value):
             return ""
-        return f"curves: records every {np.median(np.diff(time)):.3g} s"
+        return (
+            f"curves: records every {np.median(np.diff(time)):.3g} s, and the largest of all steps"
+        )
 
 
 _ON_CURVE = 0.03
@@ -252,7 +254,7 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     if peak.time >= begin:
         close.plot(peak.time, peak.value, "o", color=style.VERMILION, markersize=6, zorder=4)
     # Of runs whose joints wait for each other it may be half of the whole.
-    style.name_panel(close, f"from {begin:.3g} s on, enlarged")
+    style.name_panel(close, f"from {number_text(begin, 3)} s on, enlarged")
     style.head(figure, whole, dataset, "Asynchrony")
     return figure
 

@@ -231,7 +231,7 @@ def _drive(of: Of) -> Answer:
     found.result += [
         f"in sample {int(of.campaign['sample'][k])} it is least at {angle:.3g} deg, {time:.3g} s",
         _below_zero(values),
-        *filter(None, [late]),
+        *notes.drive_notes(of.analysis.attrs),
     ]
     later = f"{name}_started"
     if later in of.analysis and (late or verdicts(of, later).result):
@@ -271,8 +271,11 @@ def _cases(of: Of) -> Answer:
         found.result.append(f"cases are chosen: design {kind}")
     else:
         found.lacks[_EXTREMES] = f'design {kind} meets them by chance; "grid" or "list" places them'
-    ground = [f"{path} = {show(value)}" for path, value in of.scene.items()
-              if path.startswith(("gravity.", "offload."))]  # fmt: skip
+    ground = [
+        f"{path} = {show(value)}"
+        for path, value in of.scene.items()
+        if path.startswith(("gravity.", "offload.")) and value != []  # no corners named: all
+    ]
     found.result.append(", ".join(ground) or "in orbit: no gravity, no lines of a test rig")
     cure = "the same seed with gravity and offload, then ringsim compare"
     return found if ground else found + Answer(lacks={"the ground": cure})
@@ -306,11 +309,20 @@ def _requirements(of: Of) -> Answer:
     return found + Answer(lacks={k: v for k, v in _cases(of).lacks.items() if k == _EXTREMES})
 
 
+_LATE = 0.01
+"""Share of a run from which on a start that is drawn is a late winch, and no tolerance."""
+
+
 @item(ECSS, "4.8.2.6.3 b Failure cases", "Failures of parts, and what to do then.")
 def _faults(of: Of) -> Answer:
-    found = Answer(
-        drawn_lines(of, lambda path, _: path.startswith("faults") or "stop_time" in path)
-    )
+    drawn, lasts = by_path(of.campaign), float(np.nanmedian(numbers(of.campaign, "final_time")))
+
+    def fails(path: str, _: str) -> bool:
+        if path.endswith(".start_time") and path in drawn:
+            return bool(np.nanmax(numbers(of.campaign, drawn[path])) > _LATE * lasts)
+        return path.startswith("faults") or "stop_time" in path
+
+    found = Answer(drawn_lines(of, fails))
     found.result += notes.reached_by_words(of.campaign, "faults")
     if "case" in of.analysis.dims:
         ends = Counter(of.analysis["case_outcome"].values.tolist())

@@ -358,7 +358,8 @@ class PantographRing(Structure):
         if scene.boom is not None and scene.boom.length < highest:
             raise ValueError(
                 f"boom.length = {scene.boom.length} m must be at least {highest:.4g} m, the "
-                "height of the stowed ring: the sliding joint would leave the boom"
+                "height of the ring folded as far as it goes (2 half_diagonal): the sliding joint "
+                "would leave the boom"
             )
         if scene.stop is not None:
             scene.require_below("stop.stowed_angle", "structure.opening_angle")

@@ -154,7 +154,8 @@ def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
         seen = seen.assign(peak_base_force_time=between) if missed else seen
         ((_, figure),) = figures_of(seen, "base")
         (words,) = (t.get_text() for t in figure.axes[2].texts if "largest" in t.get_text())
-        every = f"curves: records every {float(run['time'][1] - run['time'][0]):.3g} s"
+        apart = float(run["time"][1] - run["time"][0])
+        every = f"curves: records every {apart:.3g} s, and the largest of all steps"
         assert (every in words) == missed
         assert words.startswith("largest of all steps: " if missed else "largest: ")
     # The title tells no more than there is.

@@ -19,7 +19,8 @@ from read_page import Page
 from ringsim.analysis.comparison import compare
 from ringsim.analysis.comparison_text import compared, names_of, sections
 from ringsim.analysis.design import median_and_worst
-from ringsim.analysis.intervals import good
+from ringsim.analysis.intervals import good, is_moment, quantities
+from ringsim.analysis.requirements import required_by
 from ringsim.analysis.study import analyse
 from ringsim.analysis.verdicts import verdict_table
 from ringsim.cli import cli
@@ -287,6 +288,30 @@ def test_what_is_nearly_the_same_in_both_has_no_panel(
     assert any("Motor power" in axes.get_xlabel() for axes in drawn["values"].axes)
 
 
+def test_a_page_holds_the_panels_of_what_is_required_first(
+    both: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    """What has no panel is named below."""
+    made = [
+        name for name, each in quantities().items()
+        if each.dtype == "f8" and not is_moment(name) and name not in both[0]
+    ][:14]  # fmt: skip
+    random = np.random.default_rng(5)
+    one, other = (
+        each.assign({name: ("sample", random.random(8), {"units": "1"}) for name in made})
+        for each in both
+    )
+    drawn = list(itertools.islice(figures_of_both(compare(one, other), one, other), 2))
+    wanted = [name for name in required_by(one.attrs) if name in quantities()]
+    assert "asynchrony_max" in wanted
+    for _, _, figure in drawn:
+        assert len([axes for axes in figure.axes if axes.axison]) == 12
+        told = " ".join(figure.legends[0].get_title().get_text().split())
+        left = told.partition("In the table alone: ")[2].split(", ")
+        assert len(left) >= 3
+        assert not set(left) & set(wanted)
+
+
 def test_differences_have_their_unit_and_labels_stand_apart(
     both: tuple[xr.Dataset, xr.Dataset],
 ) -> None:
@@ -339,6 +364,10 @@ def test_the_verb_writes_the_page_and_refuses_what_it_cannot_write(
             "the page is HTML: give a name such as page.html",
         ),
         (["--pdf"], "--pdf: has no effect without --report"),
+        (
+            ["--out", "page.html"],
+            "--out page.html: it writes netCDF; the page is --report page.html",
+        ),
         (["--report", str(tmp_path / "none" / "page.html")], "none"),
     ):
         done = CliRunner().invoke(cli, ["compare", *paths, *more])

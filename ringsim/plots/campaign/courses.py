@@ -284,14 +284,17 @@ _SMALL = 0.05
 """Share up to which a bar is hardly seen, or how high it is."""
 
 
-def _name_small(axes: Axes, sections: Array, shares: list[Array]) -> None:
-    """Above each stack of bars the shares in it that are too small to be read off."""
+def _name_small(axes: Axes, sections: Array, shares: list[tuple[str, Array]]) -> None:
+    """Above each stack of bars the shares in it that are too small to be read off, in the colour of
+    their bars: they are not that of the stack.
+    """
     for number, section in enumerate(sections):
-        own = [each[number] for each in shares]
-        told = [f"{100.0 * share:.2g}%" for share in own if 0.0 < share < _SMALL]
-        if told:
-            axes.text(section, sum(own) + 0.02, "\n".join(reversed(told)), ha="center", va="bottom",
-                      fontsize=8)  # fmt: skip
+        height = sum(each[number] for _, each in shares)
+        small = [(c, each[number]) for c, each in shares if 0.0 < each[number] < _SMALL]
+        for k, (colour, share) in enumerate(small):
+            axes.annotate(f"{100.0 * share:.2g}%", (section, height), xytext=(0, 2 + 9 * k),
+                          textcoords="offset points", ha="center", fontsize=8, color=colour,
+                          fontweight="bold")  # fmt: skip
 
 
 @picture(
@@ -316,7 +319,7 @@ def lock_order(campaign: xr.Dataset) -> Figure:
             axes.bar(sections, table[row], 0.6, below, color=colour, hatch=hatch,
                      edgecolor="white", linewidth=0.3, label=label)  # fmt: skip
             below += table[row]
-        _name_small(axes, sections, [table[row] for _, table in drawn])
+        _name_small(axes, sections, [(colour, table[row]) for (_, colour, _), table in drawn])
         axes.set_title(f"{plane} plane", fontsize=9.5)
         axes.grid(visible=False, axis="x")
     grid[0].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)

@@ -290,7 +290,8 @@ def motors(campaign: xr.Dataset) -> Figure:
             axes.set_ylabel(style.label(read[what], width=22), fontsize=9)
     ran_on = over_time(figure, grid.ravel().tolist(), campaign, read, curves, words)
     grid[-1, 0].set_xlabel(style.label(read["time"]))
-    head(figure, campaign, "Motors", over_time_told(campaign, words) + ran_on)
+    note = f"{over_time_told(campaign, words)}{ran_on} At recorded times: peaks may be higher."
+    head(figure, campaign, "Motors", note)
     return figure
 
 
@@ -404,6 +405,8 @@ def tension(campaign: xr.Dataset) -> Figure:
             axes.plot(own["span"], own.sel(sample=worst), color=style.INK, linewidth=0.9,
                       linestyle=(0, (3, 1.5)), label=names)  # fmt: skip
         style.draw_limit(axes, limit, f"limits.tension = {limit:g} N")
+        for word, most in limits(campaign, "peak_tension"):
+            style.draw_limit(axes, most, f"required: {word} {most:g} N")
         axes.set_title(f"{plane} cable", fontsize=9.5)
         axes.xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     style.from_zero(grid[0])  # all panels share it
@@ -415,7 +418,8 @@ def tension(campaign: xr.Dataset) -> Figure:
     legend(figure, [grid[0]], 4)
     counted = int(np.isfinite(found.to_numpy()).any(axis=(1, 2)).sum())
     note = f"{told(campaign, counted)}.{lines_told(campaign) * bool(cases)}"
-    note += " At recorded times until the last lock, or to the end where latches do not catch."
+    note += " At recorded times until the last lock, or to the end where latches do not catch: "
+    note += "peaks may be higher."
     head(figure, campaign, "Tension along the cables", note)
     return figure
 

@@ -43,7 +43,7 @@ from ringsim.analysis.intervals import (
     used,
     varies,
 )
-from ringsim.analysis.requirements import required_by
+from ringsim.analysis.requirements import required_by, without_twins
 from ringsim.analysis.worst import one_at_a_time
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.base import DOUBT
@@ -189,15 +189,17 @@ MOST_PANELS = 9
 
 
 def drawable(campaign: xr.Dataset) -> list[str]:
-    """Main numbers, and whatever else tables have that differs between samples, or is limited."""
+    """Main numbers, and whatever else tables have that differs between samples, or is limited;
+    nothing twice.
+    """
     limited, names = required_by(campaign.attrs), scalars(campaign)
-    return names + [
+    return without_twins(campaign, names + [
         name for name, variable in quantities().items()
         if name not in names and name in campaign and len(values_of(campaign, name)[1])
         and (name in limited or (
             variable.dtype == "f8" and not is_moment(name) and varies(campaign, name)
         ))
-    ]  # fmt: skip
+    ], limited)  # fmt: skip
 
 
 def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tuple[list[str], str]:
