@@ -119,8 +119,8 @@ _NAMED = 6
 STEPS = 50.0
 """Steps in the lowest period of the slowest rod that shocks need at locks.  Steps that follow
 shocks are 64 (``ringsim.stepping.repeats.FRONT``).  With 32, loads at the base of one random ring
-in four were off by a third, with 8 those of flights of 8 m by up to 18 %, with 1 or less by half,
-and impulses of stops up to 15 times too large."""
+in four were off by a seventh (benchmarks/shock_steps.py), with 8 those of flights of 8 m by up to
+18 %, with 1 or less by half, and impulses of stops up to 15 times too large."""
 SHARP = {"peak_acceleration_max": 500.0}
 """The same of numbers that a stop's damper makes within a thousandth of a second, as it begins to
 push at a corner: of 5 rings one had 8.3 m/s^2, and 2.1 with 32."""
@@ -332,7 +332,7 @@ _OF_MOTION, _OF_STRESS, _OF_SHOCKS = (0.7, 1.15), (0.3, 1.0), (0.4, 0.9)
 tolerance: nothing else, vibrations of the ring, or shocks.  1 if it ruled all: measured from 2.6 to
 17 times on frames of ring18-cable and ring18-ground with 4 and 6 sections and truss2, 0.71 to 0.96,
 up to 1.16 on ring18-flight; with stresses on these and on flights of 4 and 12 sections, 0.32 to
-0.99; with shocks on these, 0.51 to 0.78."""
+0.99; with shocks on these, 0.51 to 0.81."""
 
 
 def _cure(run: Run) -> str:

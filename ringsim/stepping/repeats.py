@@ -201,11 +201,8 @@ _FINEST_FRONT = 512.0
 """The same at most: with 6000, round-off of the places of a spacecraft of 500 kg was 1 N of base
 force, which falls with the square of steps."""
 GRADE = 16.0
-"""Time since a lock over the next step: as the shock spreads through the rods it lasts longer.  Of
-41 random rings on held bases, the base force was off by 1.6 % in the median and 8 % in three of
-four, its torque by 1.2 and 5 %, against steps of an eighth and 128; with a ``FRONT`` of 32 and a
-quarter of the time since the lock by 4.4 and 29 %, 2.4 and 15 %, with steps in 1 / 1.3 of their
-number.  With 128 here and there it was 1.0 and 5 %, with 1.5 times as many."""
+"""Time since a lock over the next step: as the shock spreads through the rods it lasts longer.
+docs/evidence/benchmarks.md has errors and costs of other values, on random rings, too."""
 _RINGING = 1.0
 """Periods of the slowest rod for which this holds."""
 
