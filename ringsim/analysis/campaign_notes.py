@@ -191,7 +191,8 @@ def plane_line(campaign: xr.Dataset) -> str:
     together; empty if it is not.  From the start of the last winch on where one starts late: before
     it one plane has no drive.
     """
-    late = "_started" if np.isfinite(numbers(campaign, "least_plane_margin_started")).any() else ""
+    before, later = (numbers(campaign, f"least_plane_margin{end}") for end in ("", "_started"))
+    late = "_started" if (later > before)[good(campaign)].any() else ""
     both, own = (numbers(campaign, f"least_{of}_margin{late}") for of in ("drive", "plane"))
     held = good(campaign) & np.isfinite(both) & np.isfinite(own)
     if not held.any():
@@ -202,9 +203,9 @@ def plane_line(campaign: xr.Dataset) -> str:
     k, short = int(np.argmin(np.where(held, own, np.inf))), int((own[held] < 0.0).sum())
     word = f"NOT enough in {_of(short, int(held.sum()))}" if short else "enough"
     sample = int(campaign["sample"][k])
-    then = " from the start of the last winch on" * bool(late)
+    when = " from the start of the last winch on" * bool(late)
     return (
-        f"the least drive margin of one plane's own cable{then} is {least:.3f} (sample {sample}): "
+        f"the least drive margin of one plane's own cable{when} is {least:.3f} (sample {sample}): "
         f"{word}"
     )
 
