@@ -391,6 +391,8 @@ def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
         # A stop only brakes: the joint came at least as fast as it goes on, and at an even
         # acceleration as fast as it must have to be there by then.
         fast, way = float(speed[step + 1]), time - float(times[step])
+        if rate == 0.0 < way:  # it came, so that it moved: on the mean of the step as fast as this
+            rate, unsure = -float(own[step]) / way, 1.0
         if way > 0.0:  # a joint may be there within rounding
             fast = max(fast, -2.0 * float(own[step]) / way - float(speed[step]))
         yield Meeting(place, time, rate, max(unsure, 1.0 - rate / fast) if fast > 0.0 else unsure)

@@ -81,6 +81,18 @@ def test_a_rate_below_what_the_joint_does_next_is_uncertain() -> None:
 
 
 @pytest.mark.quick
+def test_a_joint_that_comes_within_one_step_has_moved() -> None:
+    """Carried on it would stop before 180 deg, which it passes all the same: with steps of 4.3 s on
+    the ground a joint had a rate of 0, and violated what a latch asks for.
+    """
+    times, past = [540.0, 545.0, 550.0, 554.34], [-0.30, -0.16, -0.107, 9e-4]
+    found = meeting(times, past, [0.035, 0.02, 0.001, 0.0])
+    assert found.rate == pytest.approx(0.107 / (found.time - 550.0), rel=1e-12)
+    assert 550.0 < found.time < 554.34
+    assert found.unsure == 1.0
+
+
+@pytest.mark.quick
 def test_a_joint_jerked_by_the_lock_of_another_goes_on_with_the_smaller_acceleration() -> None:
     times, speeds = np.array([0.0, 0.1, 0.2, 0.3]), np.array([0.1, 0.12, 0.2, 0.01])
     past = np.array([-0.05, -0.04, -0.02, 1e-4])
