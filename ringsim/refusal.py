@@ -88,6 +88,11 @@ def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
     for fault in faults[1:]:
         if cause and fault["msg"].startswith(f"Value error, {cause[1]} is not "):
             continue
+        # Of outputs of one's own none is known where one is refused.
+        if faults[0]["loc"][:1] == ("outputs",) and re.match(
+            r"Value error, \w+ is not ", fault["msg"]
+        ):
+            continue
         place, absent = _place(fault, model), fault["type"] == "missing"
         meant = line.endswith(f"(did you mean {place.rpartition('.')[2]}?)")
         own = groups["also missing" if absent else "also at fault"]

@@ -84,7 +84,7 @@ class Motors(Output):
         Variable(
             "longest_motor_lag", (), "s",
             "longest time that any motor was slower than commanded",
-            summary=("a motor was slower than commanded", "10.3g"), worse="larger",
+            summary=("longest lag of a motor", "10.3g"), worse="larger",
             largest_of="motor_lag_duration",
         ),
         Variable(

@@ -340,6 +340,18 @@ def test_names_that_mean_something_are_refused(name: str) -> None:
         of(f"{json.dumps(name)} = 'peak_tension'")
 
 
+def test_requirements_are_not_at_fault_where_another_output_is_refused() -> None:
+    """Nor are those on outputs that are sound: none is known then."""
+    apart = "apart = \"max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))\""
+    wanted = "[requirements]\napart = { max = 5.0, probability = 0.9, confidence = 0.9 }"
+    with pytest.raises(InputError) as told:
+        of(f"{apart}\nbad = \"max(cable_tension, over='time')\"", wanted)
+    assert "outputs.bad" in str(told.value)
+    assert "at fault" not in str(told.value)
+    with pytest.raises(InputError, match=r"requirements\.aprt is not an output"):
+        of(apart, wanted.replace("apart", "aprt"))
+
+
 def test_a_plan_tells_that_records_miss_short_peaks(tmp_path: Path) -> None:
     file = tmp_path / "own.toml"
     file.write_text(FILE.format(outputs="x = 'max(asynchrony)'", more=""), encoding="utf-8")
