@@ -186,27 +186,35 @@ def late_line(campaign: xr.Dataset) -> str:
     return f"{line}; from then on all have at least {later[k]:.4g} ({where})"
 
 
-def plane_line(campaign: xr.Dataset) -> str:
-    """The least drive margin of one plane's own cable, where it is less than the least of both
-    together; empty if it is not.  From the start of the last winch on where one starts late: before
-    it one plane has no drive.
+_STARTED = "_started"
+
+
+def plane_margin(campaign: xr.Dataset) -> str:
+    """The output with the margin of one plane's own cable, where its least of all samples is less
+    than that of both together; empty if it is not.  From the start of the last winch on where one
+    starts late: before it one plane has no drive.
     """
-    before, later = (numbers(campaign, f"least_plane_margin{end}") for end in ("", "_started"))
-    late = "_started" if (later > before)[good(campaign)].any() else ""
+    before, later = (numbers(campaign, f"least_plane_margin{end}") for end in ("", _STARTED))
+    late = _STARTED * bool((later > before)[good(campaign)].any())
     both, own = (numbers(campaign, f"least_{of}_margin{late}") for of in ("drive", "plane"))
     held = good(campaign) & np.isfinite(both) & np.isfinite(own)
-    if not held.any():
+    # Planes of a ring that sags a little are no news.
+    if not held.any() or not own[held].min() < both[held].min() - 5e-3:
         return ""
-    least, whole = own[held].min(), both[held].min()
-    if not least < whole - 5e-3:  # planes of a ring that sags a little are no news
+    return f"least_plane_margin{late}"
+
+
+def plane_line(campaign: xr.Dataset) -> str:
+    """The least ``plane_margin`` in words; empty if there is none to tell."""
+    if not (name := plane_margin(campaign)):
         return ""
-    k, short = int(np.argmin(np.where(held, own, np.inf))), int((own[held] < 0.0).sum())
-    word = f"NOT enough in {_of(short, int(held.sum()))}" if short else "enough"
-    sample = int(campaign["sample"][k])
-    when = " from the start of the last winch on" * bool(late)
+    own = np.where(good(campaign), numbers(campaign, name), np.nan)
+    k, short = int(np.nanargmin(own)), int((own < 0.0).sum())
+    word = f"NOT enough in {_of(short, int(np.isfinite(own).sum()))}" if short else "enough"
+    when = " from the start of the last winch on" * name.endswith(_STARTED)
     return (
-        f"the least drive margin of one plane's own cable{when} is {least:.3f} (sample {sample}): "
-        f"{word}"
+        f"the least drive margin of one plane's own cable{when} is {own[k]:.3f} "
+        f"(sample {int(campaign['sample'][k])}): {word}"
     )
 
 
@@ -294,8 +302,7 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 error += _checked(worst, variable)
                 name = variable.summary[0] + DOUBT * (f'"{variable.name}"' in says.get(OFF, ""))
                 lines.append(f"{name} in sample {sample}: {said}{error}{mark}")
-    # Not again where the worst sample of both is that of the plane.
-    lines += [told for told in [plane_line(sound)] if told and not _has_been_told(lines, told)]
+    lines += filter(None, [plane_line(sound)])
     if unknown:
         lines.append(
             "no sample has numerical error bars: set error_bars_every in the campaign file, or run "
@@ -303,11 +310,6 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
             "run one.toml --set solver.error_bars=true"
         )
     return [*lines, *filter(None, [off_note(says)])]
-
-
-def _has_been_told(lines: list[str], told: str) -> bool:
-    number = told.partition(" is ")[2].partition(" (")[0]
-    return any("one plane" in line and line.rpartition(number)[1] for line in lines)
 
 
 def _checked(worst: xr.Dataset, variable: Variable) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import doubted, late_line, marked, plane_line
+from ringsim.analysis.campaign_notes import doubted, late_line, marked, plane_margin
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -440,9 +440,8 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         known = good(campaign) & np.isfinite(values)  # ropes that never were slack have 0 s of it
         counts = int((known & (values > allowed)).sum()), int(known.sum())
         rows.append((told, peak, of, float(ratio[k]), float(values[k]), k, *counts))
-    late, own = bool(late_line(campaign)), plane_line(campaign)
-    plane = f"{_PLANE}_started" if "from the start" in own else _PLANE
-    for name in (_DRIVE, *[f"{_DRIVE}_started"] * late, *[plane] * bool(own)):
+    late = [f"{_DRIVE}_started"] * bool(late_line(campaign))
+    for name in (_DRIVE, *late, *filter(None, [plane_margin(campaign)])):
         least = np.where(good(campaign), numbers(campaign, name), np.nan)
         if np.isfinite(least).any():
             k = int(np.nanargmin(least))

@@ -119,8 +119,8 @@ _NAMED = 6
 STEPS = 50.0
 """Steps in the lowest period of the slowest rod that shocks need at locks.  Steps that follow
 shocks are 64 (``ringsim.stepping.repeats.FRONT``).  With 32, loads at the base of one random ring
-in four were off by a seventh (benchmarks/shock_steps.py), with 8 those of flights of 8 m by up to
-18 %, with 1 or less by half, and impulses of stops up to 15 times too large."""
+in four were off by more than a seventh (benchmarks/shock_steps.py), with 8 those of flights of 8 m
+by up to 18 %, with 1 or less by half, and impulses of stops up to 15 times too large."""
 SHARP = {"peak_acceleration_max": 500.0}
 """The same of numbers that a stop's damper makes within a thousandth of a second, as it begins to
 push at a corner: of 5 rings one had 8.3 m/s^2, and 2.1 with 32."""

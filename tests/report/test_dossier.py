@@ -242,6 +242,20 @@ def test_every_number_is_that_of_the_file(stored: tuple[File, xr.Dataset]) -> No
 
 
 @pytest.mark.quick
+@pytest.mark.parametrize(("latest", "fails"), [(0.004, False), (0.05, True)])
+def test_a_winch_that_starts_late_is_a_failure_and_a_tolerance_is_none(
+    latest: float, fails: bool
+) -> None:
+    """Of the time that runs take, so much at most."""
+    campaign, path = made_campaign(8), "cables.lower.winch.start_time"
+    starts = np.linspace(0.0, latest, 8) * np.median(campaign["final_time"])
+    about = {"role": "input", "path": path, "units": "s", "distribution": "uniform"}
+    made = campaign.assign(late=("sample", starts, about))
+    own = row(rows_of(made), "Failure cases")
+    assert ("start_time" in own["result"]) == fails
+
+
+@pytest.mark.quick
 def test_what_a_campaign_lacks_is_missing_with_its_cure() -> None:
     """Neither motors, latches, allowables, temperatures nor a test."""
     ecss, nasa = rows_of(made_campaign()), rows_of(made_campaign(), NASA)
