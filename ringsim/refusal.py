@@ -167,7 +167,7 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     kinds = _kinds(field)
     match kind:
         case "extra_forbidden":
-            # A model may tell of the keys that it once had.
+            # A model may tell of keys that it once had, or that people look for.
             hint = getattr(owner, "gone", {}).get(key) or _other_kinds_key(path, owner)
             keys = owner.model_fields if owner else {}
             # A key that is a word of Python has another name in the model.

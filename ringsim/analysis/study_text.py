@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis import derived
 from ringsim.analysis.campaign_notes import (
     DOUBTED,
     MARK,
@@ -403,8 +404,11 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     notes = [f"the same in all samples: {', '.join(alike)}"] * bool(alike)
     notes += [f"samples differ by less than {100 * ALIKE:g} %: {', '.join(flat)}"] * bool(flat)
     notes += [f"in all samples {', '.join(again)}"] * bool(again)
-    if any(row[-2] == "-" for row in rows):
-        notes.append("no worst sample of outputs of which nothing says which end is worse")
+    if unsaid := [row[0] for row in rows if row[-2] == "-"]:
+        known = derived.known_from(analysis.attrs).items()
+        own = [name for name, each in known if name in unsaid and each.worse is None]
+        cure = f' (of {", ".join(own)} worse = "larger" or "smaller" under [outputs] says it)'
+        notes.append(f"no worst sample where neither end is known to be worse{cure * bool(own)}")
     notes += filter(None, [analysis.attrs.get(RECORDED)])
     if within:
         notes.append(f"{_WITHIN}: {'; '.join(within)}")

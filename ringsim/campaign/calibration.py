@@ -4,14 +4,14 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import netCDF4
 import numpy as np
 import scipy
 import tomli_w
 import xarray as xr
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
 from ringsim import build
 from ringsim.analysis.posterior import (
@@ -28,16 +28,14 @@ from ringsim.analysis.residuals import check_sensors, predictions
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, listed_cases, require_no_launcher, start
-from ringsim.campaign.specification import Campaign, campaign_of
+from ringsim.campaign.specification import Campaign, Stages, campaign_of
 from ringsim.files import parse_toml, read_text, whole, writing
 from ringsim.measured import Measurement, load_measured
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
 from ringsim.sampling.columns import Table, add_inputs, correlate, pairs_of
 from ringsim.sampling.designs.independent import sobol_points
 from ringsim.sampling.distributions import Array, Calibrated, Ranged, inside
-from ringsim.sampling.table import AnyDistribution
 from ringsim.scene import Scene
-from ringsim.units import Model
 from ringsim.variables import Status
 
 POSTERIOR = "posterior.nc"
@@ -56,35 +54,13 @@ _NAME = "ringsim.Calibration"
 """How refusals of arguments begin, as those of files with the file's name."""
 
 
-class ClockPrior(Model):
-    """What is not known of the measured clock, in place of the measured file's values."""
-
-    offset: AnyDistribution | None = None
-    """Of clock.offset, s."""
-    drift: AnyDistribution | None = None
-    """Of clock.drift."""
-
-
-class Budget(Model):
-    """What a calibration file has beyond the keys of a campaign file."""
-
-    measured: str
-    """File of measured data, beside this file."""
-    runs: Annotated[int, Field(ge=16, le=1_000_000)] = 256
-    """Of all stages together."""
-    stages: Annotated[int, Field(ge=1, le=20)] = 4
-    """How often the ensemble is drawn anew, the first time from the priors."""
-    clock: ClockPrior = ClockPrior()
-    """Unknowns of the measured clock."""
-
-
 @dataclass(frozen=True)
 class Given:
     """A calibration file: its campaign of the priors, the measured data, and the budget."""
 
     campaign: Campaign
     measurement: Measurement
-    budget: Budget
+    budget: Stages
 
     @property
     def members(self) -> int:
@@ -111,11 +87,11 @@ def calibration_of(
     table, settings = parse_toml(text, path.name), dict(settings or {})
     # --set reaches the scene's values, and how much is run.
     table |= {name: settings.pop(name) for name in ("runs", "stages") if name in settings}
-    own = {name: table.pop(name) for name in Budget.model_fields if name in table}
+    own = {name: table.pop(name) for name in Stages.model_fields if name in table}
     try:
-        budget = Budget.model_validate(own)
+        budget = Stages.model_validate(own)
     except ValidationError as error:
-        raise InputError(explain(error, Budget, path.name)) from None
+        raise InputError(explain(error, Stages, path.name)) from None
     stages = "a calibration runs all its stages: leave it out"
     checks = "leave it out, and run samples of the result by the full engine"
     for key, cure in {

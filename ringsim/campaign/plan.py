@@ -22,7 +22,7 @@ from ringsim.analysis.requirements import Requirement, doubt_of
 from ringsim.campaign.folder import Folder, digests, opened_as, other_build
 from ringsim.campaign.merging import is_behind
 from ringsim.campaign.run import Order, grown, growth_told
-from ringsim.campaign.watch import End, decided, looks_of
+from ringsim.campaign.watch import End, decided, looks_of, named
 from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
 from ringsim.execution.work import Array, Work, relative_cost
@@ -371,7 +371,7 @@ def status_lines(campaign: Folder) -> list[str]:
     ]  # fmt: skip
     if unfinished:
         longest = sorted(unfinished, key=lambda item: -item[1])[:_MOST_SHOWN]
-        listed = ", ".join(f"{_named(number)} ({seconds:.0f} s)" for number, seconds in longest)
+        listed = ", ".join(f"{named(number)} ({seconds:.0f} s)" for number, seconds in longest)
         usual = spent[0] / ended[0] if ended[0] else np.inf
         if longest[0][1] > _UNUSUAL * usual:
             listed += f"; those that have ended took {usual:.2g} s each"
@@ -460,7 +460,3 @@ def _stopping(campaign: Folder, planned: int, end: End | None) -> list[str]:
     return (
         [f"  early stop     next checked after {coming[0]} samples (stop_when)"] if coming else []
     )
-
-
-def _named(number: int) -> str:
-    return str(number) if number >= 0 else f"check of {sample_of(number)}"

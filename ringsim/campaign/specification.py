@@ -187,7 +187,9 @@ class Variable(Model):
     """What may be chosen: a scene value between two bounds."""
 
     low: float
+    """Least value, in the unit of the path."""
     high: float
+    """Largest value."""
     scale: Literal["linear", "log"] = "linear"
     """Whether steps or ratios of the value matter."""
     shared: Annotated[tuple[str, ...], ListIn] = ()
@@ -218,7 +220,9 @@ class Aim(Model):
     """A statistic of an output, to be made small or large."""
 
     minimise: Literal["mean", "quantile", "probability"] | None = None
+    """What of the output is to be small."""
     maximise: Literal["mean", "quantile"] | None = None
+    """What of the output is to be large; one of the two must be given."""
     probability: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
     """Below the quantile."""
     max: float = 0.0
@@ -285,6 +289,31 @@ class Budget(Model):
                     f"verdict = {least} at least, better twice that"
                 )
         return self
+
+
+# What a calibration file has beyond these keys.
+
+
+class ClockPrior(Model):
+    """What is not known of the measured clock, in place of the measured file's values."""
+
+    offset: AnyDistribution | None = None
+    """Of clock.offset, s."""
+    drift: AnyDistribution | None = None
+    """Of clock.drift."""
+
+
+class Stages(Model):
+    """What a calibration file has beyond the keys of a campaign file."""
+
+    measured: str
+    """File of measured data, beside this file."""
+    runs: Annotated[int, Field(ge=16, le=1_000_000)] = 256
+    """Of all stages together."""
+    stages: Annotated[int, Field(ge=1, le=20)] = 4
+    """How often the ensemble is drawn anew, the first time from the priors."""
+    clock: ClockPrior = ClockPrior()
+    """Unknowns of the measured clock."""
 
 
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"

@@ -179,8 +179,14 @@ class Watch:
 # Signals and progress.
 
 
+def named(number: int) -> str:
+    """A sample, or a check of one, in words."""
+    return f"sample {number}" if number >= 0 else f"check of {sample_of(number)}"
+
+
 _STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 _PLAIN_SECONDS = 30.0
+"""Between two lines where there is no bar; those without news come after twice the time each."""
 _FILE_SECONDS = 1.0
 
 
@@ -250,6 +256,7 @@ class Progress:
         self._checked = 0
         self._spent, self._ended = [0.0, 0.0], [0, 0]
         self._begin = self._told = time.monotonic()
+        self._pause, self._drawn = _PLAIN_SECONDS, self._begin
         notebook = "ipykernel" in sys.modules
         # Without its widgets tqdm warns, and shows less than its bar of letters does.
         if notebook and importlib.util.find_spec("ipywidgets"):
@@ -292,13 +299,28 @@ class Progress:
             self.failed += result.status.failed
             self._bar.set_postfix(self._counts(), refresh=False)
             self._bar.update()
-        if self._bar.disable and time.monotonic() - self._told > _PLAIN_SECONDS:
-            self._told = time.monotonic()
+        if time.monotonic() - self._told > _PLAIN_SECONDS:
+            self._pause = _PLAIN_SECONDS
+            self._tell_counts()
+
+    def _tell_counts(self, more: str = "") -> None:
+        self._told = time.monotonic()
+        if self._bar.disable:
             checks = f", {self._checked} of {self.checks} checks" if self.checks else ""
-            self._tell(f"{self.done} of {self.total} done, {self.failed} failed{checks}")
+            self._tell(f"{self.done} of {self.total} done, {self.failed} failed{checks}{more}")
 
     def refresh(self) -> None:
-        """Write the progress file if there are news, not more often than each second."""
+        """Tell what runs where nothing has ended for long, and write the progress file if there are
+        news, not more often than each second.
+        """
+        now = time.monotonic()
+        if self.running and now - self._told > self._pause:
+            number, begin = min(self.running.items(), key=lambda item: item[1])
+            self._pause *= 2.0
+            self._tell_counts(f"; running: {named(number)}, for {now - begin:.0f} s")
+        if not self._bar.disable and now - self._drawn >= _FILE_SECONDS:
+            self._drawn = now
+            self._bar.refresh()  # its clock
         if self._news and time.monotonic() - self._written >= _FILE_SECONDS:
             self._save("running")
 

@@ -1,6 +1,7 @@
 """``ringsim campaign``, ``status`` and ``replay``."""
 
 import faulthandler
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ from ringsim.files import require_file
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.balance import rules
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, InputError, show
+from ringsim.sampling.columns import Table
+from ringsim.sampling.distributions import plain
 from ringsim.storage.result import Result, check_of
 from ringsim.tables import unit_text, with_unit
 from ringsim.variables import GOALS, TIMINGS, Outcome
@@ -215,6 +218,8 @@ def replay_command(
     elif settings:
         told = ", ".join(f"{path} = {_rounded(value)}" for path, value in settings.items())
         click.echo(f"with {told} beside the stored result:")
+        for line in _left_alone(campaign.table, sample, settings):
+            click.echo(f"  {line}")
         for line in changed(result.arrays(), before.arrays()):
             click.echo(f"  {line}")
     elif different := _differences(result, before):
@@ -233,6 +238,16 @@ def replay_command(
     else:
         click.echo("identical to the stored result")
     return EXIT_FAILED if result.status.failed else EXIT_DONE
+
+
+def _left_alone(table: Table, sample: int, settings: Mapping[str, Any]) -> Iterator[str]:
+    """What keeps its drawn value though it shares that with a path that was set."""
+    set_ = {c.input: c.path for c in table.columns if c.input and c.path in settings}
+    for column in table.columns:
+        if column.path and column.input in set_ and column.path not in settings:
+            value = _rounded(plain(column.values[sample]))
+            other = set_[column.input]
+            yield f"{column.path} keeps {value}, which it shared with {other}: set it, too"
 
 
 def _differences(result: Result, before: Result) -> list[str]:

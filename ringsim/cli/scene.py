@@ -450,20 +450,20 @@ def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
     help="Know the kinds and outputs of this file or module, too, as under imports of a scene.",
 )
 def explain_command(names: tuple[str, ...], schema: str | None, imports: tuple[str, ...]) -> None:
-    """Explain the variables of a result, or the keys of a scene or campaign file.
+    """Explain the variables of a result, or the keys of a file.
 
     NAME is a variable (asynchrony_max), the path of a key (cables.upper.winch, solver.step,
-    design), or one of the words scene and campaign for all keys of such files.  Without a name all
-    variables are listed.
+    design), or a kind of file for all of its keys: scene, campaign, measured, optimisation or
+    calibration.  Without a name all variables are listed.
     """
     extensions.load(extensions.located(imports, Path()))
     if schema is not None:
         _print_schema(schema, names)
         return
     if imports:
-        from ringsim.reference.tree import ROOTS, schema_of
+        from ringsim.reference.tree import schema_of
 
-        for root in ROOTS:  # refuses records that no file could choose
+        for root in ("scene", "campaign"):  # refuses records that no file could choose
             schema_of(root)
     known = COORDINATES | {SPAN_NAME.name: SPAN_NAME} | VARIABLES
     # Paths are looked up before anything is printed, so that one that is refused stands alone.
@@ -482,7 +482,7 @@ def explained(variable: Variable) -> str:
 
 
 def _key(name: str, variables: dict[str, Variable]) -> str:
-    """A key of scenes or campaigns in words; InputError if there is none of that name."""
+    """A key of files in words; InputError if there is none of that name."""
     # Here, because variables are explained without reading every record of the package.
     from ringsim.reference import tree
 

@@ -307,7 +307,7 @@ class DriveMargins(Output):
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
         word = "enough" if margin >= 0.0 else "NOT enough"
         if margin >= 0.0 and values.get("outcome") in (Fate.PARTLY_DEPLOYED, Fate.STALLED):
-            word = "enough for rigid rods, in which driven sections open those that are not"
+            word = "enough if rods were rigid: driven sections would open the others, too"
         # Before the last winch starts one plane has no drive, as everybody knows who delays it.
         whole = float(values.get("least_plane_margin", math.nan))
         plane = float(values.get("least_plane_margin_started", whole))

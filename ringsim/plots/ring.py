@@ -79,7 +79,9 @@ def ring(dataset: xr.Dataset, states: int = 3) -> Figure:
     sizes = np.array([lines.max(axis=(0, 1)) for _, lines, _ in shots]) - low
     height = float(sizes[:, 1].max())
     scale, cells = _fit(sizes[:, 0], height)
-    subject = "Deployment as computed" if shape.computed else "Deployment"
+    turns = any(_turn(dataset, angles).any() for _, angles in moments)
+    subject = f"Deployment{', seen from the base' * turns}"  # whose turn angles alone do not show
+    subject = "Deployment as computed" if shape.computed else subject
     wide, high = _WIDTH + 2 * _SIDE, below + height * scale + _ABOVE
     high += style.further_lines(dataset, subject, wide)
     figure = Figure(figsize=(wide, high))

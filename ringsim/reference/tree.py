@@ -1,4 +1,4 @@
-"""Where keys stand: paths through scenes and campaigns, their words, and JSON Schemas of them."""
+"""Where keys stand: paths through all kinds of files, their words, and JSON Schemas of some."""
 
 import difflib
 import functools
@@ -14,19 +14,24 @@ from pydantic_core import core_schema
 from ringsim.cable.friction import PulleyFriction
 from ringsim.cable.records import CABLES
 from ringsim.cable.ropes import CableFault
-from ringsim.campaign.specification import Specification
+from ringsim.campaign.specification import Budget, Specification, Stages
 from ringsim.choice import OneOf, kinds_of
+from ringsim.measured import Measured
 from ringsim.overrides import place_of
 from ringsim.reference.keys import Key, keys_of, kind_in, words_of
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.scene import Scene
 from ringsim.units import LEFT_OUT, Model
 
-# Where keys stand: paths through scenes and campaigns, and what a path leads to.
+# Where keys stand: paths through files, and what a path leads to.
 
 
-ROOTS: dict[str, type[Model]] = {"scene": Scene, "campaign": Specification}
-"""What a file may be."""
+ROOTS: dict[str, type[Model]] = {
+    "scene": Scene, "campaign": Specification, "measured": Measured, "optimisation": Budget,
+    "calibration": Stages,
+}  # fmt: skip
+"""What a file may be; of the last two, the keys that they have beyond those of a campaign."""
+_SCHEMAS = ("scene", "campaign")
 ANY = "*"
 """Stands in a path for a name of the user's choice."""
 _INSIDE = {"": "", "names": f".{ANY}", "list": "[k]"}
@@ -75,7 +80,7 @@ def paths(root: str) -> list[str]:
 
 
 def find(path: str) -> list[Found]:
-    """The keys that a path leads to, in scenes and in campaigns; one for all kinds that have it so.
+    """The keys that a path leads to, in all files; one for all kinds that have it so.
 
     Numbers and names in brackets are left out, a quoted step is one name, and ``*`` is any name.
     """
@@ -125,15 +130,16 @@ def known(path: str, others: list[str]) -> list[Found]:
         return find(min(kind, key=len))
     # Words of meanings before words that look alike: an aperture is no temperature.  One letter is
     # in every meaning.
-    near = ends[:2] or (_told_of(plain)[:3] if len(plain) > 2 else [])
+    near = ends[:2] or difflib.get_close_matches(plain, ROOTS, n=1, cutoff=0.7)
+    near = near or (_told_of(plain)[:3] if len(plain) > 2 else [])
     near = near or difflib.get_close_matches(plain, [*others, *every], n=1, cutoff=0.6)
     near = near or [name for name in others if name.startswith(plain)][:3]
     hint = (
         f"did you mean {' or '.join(near)}?" if near else
-        "ringsim explain lists the variables, ringsim explain scene and campaign the keys"
+        f"ringsim explain lists the variables, ringsim explain {', '.join(ROOTS)} the keys"
     )  # fmt: skip
     raise InputError(
-        f"{path}: neither a key of a scene or campaign nor a variable of a result ({hint}); a "
+        f"{path}: neither a key of a file nor a variable of a result ({hint}); a "
         "campaign's own outputs are told in its file, under [outputs]"
     )
 
@@ -179,7 +185,7 @@ def told(found: Found) -> str:
 
 
 def all_of(root: str) -> str:
-    """The keys at the top of a scene or a campaign file."""
+    """The keys at the top of a file."""
     model = ROOTS[root]
     return "\n".join(
         [f"{root} file", *_indented(words_of(model), 2), *_keys(keys_of(model), "", 2)]
@@ -275,8 +281,8 @@ def schema_of(kind: str) -> dict[str, Any]:
 
     InputError if there is no such kind, or if a record of the user's cannot be a choice.
     """
-    if kind not in ROOTS:
-        raise InputError(f"--schema {kind}: must be {known_or_nearest(kind, ROOTS)}")
+    if kind not in _SCHEMAS:
+        raise InputError(f"--schema {kind}: must be {known_or_nearest(kind, _SCHEMAS)}")
     try:
         made = ROOTS[kind].model_json_schema(schema_generator=_Schema)
     except ValueError as error:

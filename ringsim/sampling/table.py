@@ -171,10 +171,11 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
             return [""]
         counts = {path: _each_of(base, path, middle) for path in paths}
     except InputError as error:
-        if isinstance(middle, float):  # a value that nobody has written
+        # A value that nobody has written; a path that is none is at fault with any.
+        if isinstance(middle, float) and "is not a known key" not in str(error):
             told = f"inputs: {name}: {show(middle)} is the median of what is drawn for it"
             raise InputError(f"{told}, and {error}") from None
-        raise
+        raise InputError(f"inputs: {error}") from None
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{path} has {count}" for path, count in counts.items())
         raise InputError(

@@ -3,7 +3,7 @@
 import functools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -260,12 +260,21 @@ LEAST_HINGE_OFFSET = 1e-6
 """Metre; directions of the rope between two pulleys are then good to 1e-10 in doubles."""
 
 
+_NO_DIAMETER = (
+    "a closed, regular ring of N sections and aperture diameter D has half_bar = "
+    "D sin(pi / N) / 2 - hinge_offset; half_diagonal and the cables' block_offset grow with it"
+)
+
+
 class PantographRing(Structure):
     """Sections of two crossing diagonals and two folding bars between hinge assemblies.
 
     The plan view is a polygon with equal chords on an ellipse; the hinge assemblies fix its
     angles.  Source: paper 002 (18-section antenna), table 1; paper 000 (two-section truss).
     """
+
+    gone: ClassVar[dict[str, str]] = dict.fromkeys(("diameter", "aperture"), _NO_DIAMETER)
+    """Keys that are none, and what to give in their place."""
 
     kind: Literal["pantograph-ring"] = "pantograph-ring"
     sections: Annotated[int, Field(ge=1, le=360)] = 18

@@ -120,6 +120,11 @@ def test_choices_reach_the_runs_and_the_merged_file(bench):
     assert int(before) == stored != int(after)
     assert float(more) == pytest.approx(100.0 * (int(after) / stored - 1.0), rel=0.05)
     assert "identical" not in told
+    assert "keeps" not in told
+    told = bench.run("replay", "out", 1, "--set", "cables.upper.friction.coefficient=1e-3")
+    path = "cables.lower.friction.coefficient"
+    assert f"  {path} keeps [{lower.values[1, 0]:.6g}, " in told
+    assert "which it shared with cables.upper.friction.coefficient: set it, too" in told
     assert "did you mean" in bench.run("replay", "out", 1, "--set", "solver.tolerances=1", code=2)
     more = bench.run(*start[:2], "--out", "out", solver="", code=2)
     assert "this folder has another campaign (its scene differs: solver.tolerance" in more

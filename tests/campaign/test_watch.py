@@ -78,3 +78,24 @@ def test_progress_tells_what_samples_and_checks_took(tmp_path: Path) -> None:
     assert told["spent"] == [10.0, 30.0]
     assert told["ended"] == [2, 1]
     assert told["done"] == 2
+
+
+def test_what_runs_is_told_where_nothing_ends_for_long(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Lines come after 30 s, then after twice that each, and again soon after something ended."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(watch.time, "monotonic", lambda: 0.0)
+        progress = Progress(tmp_path / "progress.json", "x", 2, 1, 0, 1, checks=1)
+        progress.started(check_of(4))
+        for now in range(1, 200):
+            patched.setattr(watch.time, "monotonic", lambda now=now: float(now))
+            progress.refresh()
+        progress.finished(SimpleNamespace(sample=check_of(4), status=Status.OK))
+        progress.close("done")
+    assert capsys.readouterr().err.splitlines() == [
+        "x: 1 of 2 samples done, 1 worker, 1 check to run",
+        "x: 1 of 2 done, 0 failed, 0 of 1 checks; running: check of 4, for 31 s",
+        "x: 1 of 2 done, 0 failed, 0 of 1 checks; running: check of 4, for 92 s",
+        "x: 1 of 2 done, 0 failed, 1 of 1 checks",
+    ]

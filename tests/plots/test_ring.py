@@ -226,6 +226,9 @@ def test_positions_are_drawn_where_they_were_computed():
         heights.append(figure.axes[0].get_ylim()[1])
         subject = figure.get_suptitle().split(":")[0]
         assert subject == ("Deployment as computed" if "position" in one else "Deployment")
+    run["base_rotation"] = ("time", "axis"), np.full((run.sizes["time"], 3), 2.0)
+    assert "as computed:" in ring(run).get_suptitle()
+    assert "Deployment, seen from the base:" in ring(run.drop_vars("position")).get_suptitle()
     assert heights[1] == pytest.approx(heights[0], rel=1e-6)
     assert 1.02 * heights[0] < heights[2] <= 1.1 * heights[0]
 

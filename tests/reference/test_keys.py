@@ -126,6 +126,7 @@ def test_keys_that_scenes_and_campaigns_share_are_told_of_both() -> None:
         ("structure.section", "did you mean structure.sections?"),
         ("rods.young_modulos[3]", "did you mean rods.young_modulus?"),
         ("dessign", "did you mean design?"),
+        ("optimise", "did you mean optimisation?"),
         ("asynchronie", "did you mean asynchrony?"),
         # A word of the meaning: the ring's diameter is no key, but follows from one.
         ("diameter", "did you mean structure.half_bar or "),

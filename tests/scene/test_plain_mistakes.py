@@ -200,6 +200,8 @@ def test_changed_distribution_is_told_with_its_input(tmp_path: Path) -> None:
     [
         ("end_time=3", "end_time is not a known key (did you mean solver.end_time?)"),
         ("stiffness=3", "(did you mean hinge_spring.stiffness or stop.stiffness or net.stiffness"),
+        ("structure.diameter=8", "structure.diameter is not a known key (a closed, regular ring of "
+         "N sections and aperture diameter D has half_bar = D sin(pi / N) / 2 - hinge_offset; "),
         ("solver.end_time=0,5", 'solver.end_time = "0,5" must be a finite number in s, without '
          "quotes: write 0.5"),
         ("solver.end_time=3s", "without quotes: write 3"),
@@ -235,6 +237,8 @@ def test_plausible_assignments_are_told_what_they_mean(assignment: str, named: s
         ("loads.force = { mean = 0.01, standard_deviation = 0.001 }",
          "inputs.loads.force.kind is missing: say which kind it is"),
         ('"loads.force" = 0.02', "inputs.loads.force = 0.02 must be a table"),
+        ('"loads.forse" = { kind = "uniform", low = 0.01, high = 0.02 }',
+         "inputs: scene ring18: loads.forse is not a known key (did you mean force?)"),
         ('"force" = { kind = "uniform", low = 0.01, high = 0.02 }', "or loads.force?"),
         ("[set]\nworkers = 2", "workers is not a known key"),
         ('"loads.force" = { kind = "normal", mean = 0.01, sigma = 0.001 }',
