@@ -1,7 +1,7 @@
 """Are the intervals of a calibration honest?  Tests made by runs of known truth.
 
 Run: python benchmarks/calibration.py [--kind coverage | bad | sound | wrong | flight]
-         [--first N] [--tests N] [--runs N] [--file F]
+         [--first N] [--tests N] [--runs N] [--ends] [--file F]
 
 Each test is of a ring of six sections with two cables: truths are drawn from the priors, a run of
 the frame engine with them is read by an encoder of 0.1 deg in every V-joint at 2 Hz, and
@@ -13,6 +13,7 @@ coverage  3 to 8 unknowns, chosen by chance.  Printed: how often the 90 and 95 %
 bad       a friction for every pulley of both cables, one of them five times the mean, with a load
           cell of 0.2 N at each winch, too: how often it is named, with how many others, and first.
           Encoders alone do not see the first pulley of a cable: it slows all sections alike.
+          With --ends there is a load cell where each rope ends, too.
 sound     the same without it: how often any pulley is told to stand out.
 wrong     as coverage with four unknowns, but the truth has dry friction in its V-joints, which the
           model lacks: how often the readings are told not to be explained.
@@ -85,9 +86,9 @@ def law(table: dict[str, Any]) -> Any:
 
 
 def readings_of(
-    scene: ringsim.Scene, stream: np.random.Generator, folder: Path, cells: bool = False
+    scene: ringsim.Scene, stream: np.random.Generator, folder: Path, spans: tuple[int, ...] = ()
 ) -> None:
-    """Write the readings of a test, stand.toml and stand.csv, with load cells if ``cells``."""
+    """Write the readings of a test, stand.toml and stand.csv, with load cells in some spans."""
     run = ringsim.simulate(scene, fidelity="frame")
     if run["status"]:
         raise ValueError(f"the truth fails: {run.attrs['reason']}")
@@ -104,11 +105,12 @@ def readings_of(
             times, own = np.append(times, lock), np.append(own, 180.0)
         exact = np.interp(TIMES, times, own, right=180.0)
         columns.append(exact + 0.1 * stream.standard_normal(len(TIMES)))
-    for plane in PLANES if cells else ():
-        tension = run["cable_tension"].sel(plane=plane, span=1).dropna("time")
+    cells = [(plane, span) for plane in PLANES for span in spans]
+    for plane, span in cells:
+        tension = run["cable_tension"].sel(plane=plane, span=span).dropna("time")
         exact = np.interp(TIMES, tension["time"], tension, right=np.nan)
         columns.append(exact + CELL * stream.standard_normal(len(TIMES)))
-    heads = ["t", *names, *(f"{plane} winch" for plane in PLANES if cells)]
+    heads = ["t", *names, *(f"{plane} span {span}" for plane, span in cells)]
     np.savetxt(folder / "stand.csv", np.column_stack([TIMES, *columns]), delimiter=",",
                header=",".join(heads), comments="", fmt="%.4f")  # fmt: skip
     lines = ['name = "stand"', 'file = "stand.csv"', "[clock]", 'column = "t"']
@@ -116,14 +118,14 @@ def readings_of(
         lines += ["[[sensors]]", f'column = "{name}"', 'variable = "opening_angle"',
                   f'place = {{ plane = "{name[:5]}", section = {name[5:]} }}', 'unit = "deg"',
                   "standard_deviation = 0.1"]  # fmt: skip
-    for plane in PLANES if cells else ():
-        lines += ["[[sensors]]", f'column = "{plane} winch"', 'variable = "cable_tension"',
-                  f'place = {{ plane = "{plane}", span = 1 }}', 'unit = "N"',
+    for plane, span in cells:
+        lines += ["[[sensors]]", f'column = "{plane} span {span}"', 'variable = "cable_tension"',
+                  f'place = {{ plane = "{plane}", span = {span} }}', 'unit = "N"',
                   f"standard_deviation = {CELL}"]  # fmt: skip
     (folder / "stand.toml").write_text("\n".join(lines))
 
 
-def one(kind: str, number: int, runs: int) -> dict[str, Any]:
+def one(kind: str, number: int, runs: int, ends: bool = False) -> dict[str, Any]:
     """What one test gives."""
     if kind == "flight":
         return flight(number, runs)
@@ -155,7 +157,8 @@ def one(kind: str, number: int, runs: int) -> dict[str, Any]:
         truth = truth.with_values({"joints.vjoint.coulomb": float(stream.uniform(*MISSING))})
     with tempfile.TemporaryDirectory() as place_:
         folder = Path(place_)
-        readings_of(truth, stream, folder, cells=pulleys)
+        cells = (1, base.spans) if ends else (1,)
+        readings_of(truth, stream, folder, cells if pulleys else ())
         calibration = ringsim.Calibration(
             base, priors, folder / "stand.toml", runs=runs, seed=number, fidelity="frame"
         )
@@ -265,6 +268,7 @@ def main() -> None:
     asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--tests", type=int, default=20)
     asked.add_argument("--runs", type=int)
+    asked.add_argument("--ends", action="store_true")
     asked.add_argument("--file", type=Path)
     wanted = asked.parse_args()
     file = wanted.file or Path("runs") / f"calibration-{wanted.kind}.json"
@@ -273,7 +277,7 @@ def main() -> None:
     for number in range(wanted.first, wanted.first + wanted.tests):
         if any(test["number"] == number for test in tests):
             continue
-        tests.append(one(wanted.kind, number, wanted.runs or RUNS[wanted.kind]))
+        tests.append(one(wanted.kind, number, wanted.runs or RUNS[wanted.kind], wanted.ends))
         file.write_text(json.dumps(tests))
         print(tests[-1], flush=True)
     print(told(wanted.kind, tests))

@@ -101,6 +101,8 @@ def _toml_cure(error: str, text: str) -> str:
     elif bound := re.match(r"([\w.-]+)\s*([<>])=?\s*([^\s#,]+)", wrong):
         key = "max" if bound[2] == "<" else "min"
         cure = f": write {bound[1]} = {{ {key} = {bound[3]}, probability = ..., confidence = ... }}"
+    elif re.search(r'=\s*"[^"]*\([^"]*=\s*"\w+"', wrong):
+        cure = ": quotes within quotes are single ones, as over='time'"
     return f"; correct that line, {shorten(wrong)}{cure}"
 
 

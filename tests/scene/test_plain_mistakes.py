@@ -246,6 +246,8 @@ def test_plausible_assignments_are_told_what_they_mean(assignment: str, named: s
         ('"loads.force" = { kind = uniform, low = 0.01 }', 'correct that line, "loads.force" = {'),
         ("[requirements]\nasynchrony_max <= 12", "asynchrony_max <= 12: write asynchrony_max = "
          "{ max = 12, probability = ..., confidence = ... }"),
+        ('[outputs]\nlast = "max(opening_angle, over="time")"', "opening_angle, over=\"time\")\": "
+         "quotes within quotes are single ones, as over='time'"),
         ("[set]\nboom = none", 'boom = none: words need quotes: write boom = "none"'),
     ],
 )  # fmt: skip
