@@ -163,8 +163,8 @@ class ErrorBar:
     safety: float
     """Bar over the error that the difference of the two runs shows."""
     of: str = ""
-    """Variable of many places of which it is the largest or least: two runs may agree in one number
-    by chance, and hardly in all of these."""
+    """Variable of many places, or axes, of which it is the largest or least: two runs may agree in
+    one number by chance, and hardly in all of these."""
 
 
 @dataclass(frozen=True)

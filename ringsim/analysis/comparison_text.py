@@ -295,7 +295,7 @@ def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
     if not names:
         return []
     if not known:
-        return ["numerical errors are not measured in either (error_bars_every), and not counted"]
+        return [f"numerical errors are not measured in either ({_cure(found)}), and not counted"]
     told = "differences within the numerical errors (root sum of squares of the error bars of both)"
     alone = "intervals are of sampling alone; " * (not found.attrs["runs"])
     return [f"{told}: {', '.join(within)}"] * bool(within) + [
@@ -304,10 +304,14 @@ def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
     ]
 
 
+def _cure(found: xr.Dataset) -> str:
+    return "solver.error_bars" if found.attrs["runs"] else "error_bars_every"
+
+
 def _without_bars(found: xr.Dataset, every: Sequence[xr.DataArray]) -> list[str]:
     """The side of which no error is known, where the other one has some."""
     return [
-        f"{name} has no error bars (error_bars_every): its numerical errors are not counted"
+        f"{name} has no error bars ({_cure(found)}): its numerical errors are not counted"
         for side, name in enumerate(names_of(found))
         if not any(np.isfinite(each.values[side]) for each in every)
     ]

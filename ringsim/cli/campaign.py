@@ -33,7 +33,7 @@ from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, InputError, 
 from ringsim.sampling.columns import Table
 from ringsim.sampling.distributions import plain
 from ringsim.storage.result import Result, check_of
-from ringsim.tables import unit_text, with_unit
+from ringsim.tables import readable, unit_text
 from ringsim.variables import GOALS, TIMINGS, Outcome
 
 
@@ -271,11 +271,13 @@ def changed(new: Arrays, old: Arrays) -> list[str]:
         # Of margins, which may be negative, no share tells anything.
         apart = before > 0.0 and np.isfinite(after) and before != after
         more = f" ({100.0 * (after / before - 1.0):+.2g} %)" if apart else ""
-        bars = (float(each.get(f"{name}_error", np.nan)) for each in (old, new))
+        bars = [float(each.get(f"{name}_error", np.nan)) for each in (old, new)]
+        factor, unit = readable(variable.units, max(abs(before), abs(after)))
         values = " -> ".join(
-            with_unit(f"{value:.5g}" + f" +- {bar:.2g}" * bool(np.isfinite(bar)), variable.units)
+            f"{factor * value:.5g}" + f" +- {factor * bar:.2g}" * bool(np.isfinite(bar))
+            + f" {unit_text(unit)}" * (unit_text(unit) != "")
             for value, bar in zip((before, after), bars, strict=True)
-        )
+        )  # fmt: skip
         lines.append(f"{variable.summary[0]:<24} {values}{more}")
     return lines
 

@@ -218,7 +218,7 @@ def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
 
     The largest difference of all joints and output times; of a function of time alone the largest
     up to each output time, shape (time,); of the largest of many places at least the root mean
-    square of theirs.
+    square of theirs, those of a series by its largest size at each place.
     """
     apart: dict[str, Array] = {}
     for name, rule in rules().items():
@@ -226,11 +226,19 @@ def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
             first, second = one.values[name], other.values[name]
             found = largest(name, np.abs(first - second))
             if np.isfinite(found).all() and rule.of in one.values.keys() & other.values.keys():
-                places = one.values[rule.of] - other.values[rule.of]
+                places = _at_places(rule.of, one) - _at_places(rule.of, other)
                 places = places[np.isfinite(places)]
-                found = np.sqrt(max(found**2, np.mean(places**2))) if places.size else found
+                found = np.sqrt(np.fmax(found**2, np.mean(places**2))) if places.size else found
             apart[name] = np.where(np.isfinite(first), found, np.nan) if found.ndim else found
     return apart
+
+
+def _at_places(name: str, run: Outcome) -> Array:
+    """Values of a result, of a series at many places the largest size at each."""
+    values, dims = np.asarray(run.values[name]), VARIABLES[name].dims
+    if "time" not in dims or len(dims) == 1:
+        return values
+    return np.asarray(np.fmax.reduce(np.abs(values), dims.index("time")))
 
 
 def largest(name: str, values: Array) -> Array:

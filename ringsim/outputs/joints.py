@@ -163,7 +163,7 @@ class Deployment(Output):
     variables = (
         Variable(
             "deployment_time", (), "s", "time at which the last V-joint reached 180 deg",
-            error_bar=ErrorBar("deployment time", safety=2.7),
+            error_bar=ErrorBar("deployment time", safety=2.7, of="lock_time"),
             summary=("deployment time", "10.4f"), worse="larger", largest_of="lock_time",
         ),
         Variable(

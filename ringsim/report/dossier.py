@@ -318,18 +318,19 @@ def _faults(of: Of) -> Answer:
     drawn, ran = by_path(of.campaign), numbers(of.campaign, "final_time")
     lasts = float(np.median(ran[np.isfinite(ran)])) if np.isfinite(ran).any() else 0.0
 
-    def fails(path: str, _: str) -> bool:
-        if path.endswith(".start_time") and path in drawn:
-            return bool(numbers(of.campaign, drawn[path]).max() > _LATE * lasts)
-        return path.startswith("faults") or "stop_time" in path
+    def late(path: str, _: str) -> bool:
+        if not path.endswith(".start_time") or path not in drawn:
+            return False
+        return bool(numbers(of.campaign, drawn[path]).max() > _LATE * lasts)
 
-    found = Answer(drawn_lines(of, fails))
+    failed = drawn_lines(of, lambda path, _: path.startswith("faults") or "stop_time" in path)
+    found = Answer([*failed, *drawn_lines(of, late)])
     found.result += notes.reached_by_words(of.campaign, "faults")
     if "case" in of.analysis.dims:
         ends = Counter(of.analysis["case_outcome"].values.tolist())
         told = ", ".join(f"{count} {end}" for end, count in ends.items())
         found.result.append(f"{counted(sum(ends.values()), 'case')} of one change each: {told}")
-    if not found.result:
+    if not failed and "case" not in of.analysis.dims:  # a late start is no failed part
         found.lacks["failures"] = 'draw faults under [inputs], or design.kind = "one-at-a-time"'
     return found
 

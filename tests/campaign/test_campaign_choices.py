@@ -125,6 +125,10 @@ def test_choices_reach_the_runs_and_the_merged_file(bench):
     path = "cables.lower.friction.coefficient"
     assert f"  {path} keeps [{lower.values[1, 0]:.6g}, " in told
     assert "which it shared with cables.upper.friction.coefficient: set it, too" in told
+    # Numbers in another unit than that of files, too, with their bars.
+    set_ = "--set", "record.stress=true", "--set", "solver.error_bars=true"
+    told = bench.run("replay", "out", 1, *set_)
+    assert re.search(r"largest asynchrony +\S+ deg -> \S+ \+- \S+ deg", told)
     assert "did you mean" in bench.run("replay", "out", 1, "--set", "solver.tolerances=1", code=2)
     more = bench.run(*start[:2], "--out", "out", solver="", code=2)
     assert "this folder has another campaign (its scene differs: solver.tolerance" in more

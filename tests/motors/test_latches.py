@@ -154,7 +154,7 @@ def test_a_winch_pulls_until_the_latches_of_its_plane_hold(pressed: xr.Dataset) 
     assert int(pressed.outcome) == Fate.NOT_LATCHED
     assert pressed.latched.values.tolist() == [[1, 1, 1], [1, 0, 1]]
     reason = pressed.attrs["reason"]
-    rest = "; came to rest with 6 of 6 V-joints at 180 deg: no winch turns"
+    rest = "; came to rest with 6 of 6 V-joints at 180 deg: no winch moves the ring"
     assert reason.startswith(f"1 of 6 latches did not catch: lower 2{rest}")
     assert float(pressed.final_time) > float(pressed.deployment_time) + 0.1 * 20.0
     # At rest a motor turns with up to 1 % of half its speed without a load.

@@ -453,7 +453,7 @@ def test_one_at_a_time_names_every_change() -> None:
     assert moves(campaign)[0] == changes
     figure = one_by_one(campaign)
     assert [t.get_text() for t in figure.axes[-1].get_xticklabels()] == changes
-    (panel,) = (a for a in figure.axes if a.get_title(loc="left").startswith("largest tension"))
+    (panel,) = (a for a in figure.axes if a.get_title(loc="left").startswith("Largest tension"))
     points = np.concatenate([c.get_offsets() for c in panel.collections])
     np.testing.assert_allclose(points, np.stack([np.arange(6), 20.0 + np.arange(6)], axis=1))
     assert not joined(panel)

@@ -401,7 +401,8 @@ def _word(variable: xr.DataArray, value: object, base: object, place: int) -> st
         return f"{last} {value:.4g}"
     old = set(re.split(r"[(),]+ ?", str(base)))
     new = [word for word in re.split(r"[(),]+ ?", str(value)) if word and word not in old]
-    return f"{last} {', '.join(new) or value}"
+    told = ", ".join(new).replace("=", " ") or str(value)
+    return told if new and last == "faults" else f"{last} {told}"  # its kind says what it is
 
 
 def short(name: str) -> str:

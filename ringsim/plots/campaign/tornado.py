@@ -4,6 +4,7 @@ import itertools
 import re
 import textwrap
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -42,10 +43,11 @@ from ringsim.plots.campaign.frame import (
     looks_of,
     moves,
     short,
+    shown,
     still,
 )
 from ringsim.stepping.instant import Array
-from ringsim.tables import counted, unit_behind
+from ringsim.tables import counted, readable, unit_behind
 
 MEASURES = {
     "total_index": "Total Sobol' index",
@@ -397,6 +399,9 @@ def _row(
 
 _MOST_NAMED = 72
 """Moves up to which each has its name on the axis."""
+_MOST_MOVED, _FEW_MOVES, _LOW_SHEET = 14, 24, 6
+"""Panels of a sheet; moves that half its width can name, and panels up to which it needs no two
+columns."""
 _LEAST_SPAN = 0.02
 """Of its largest value: axes of smaller ranges are made to span twice as much."""
 
@@ -429,15 +434,20 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
 
     Colour and marker say how the sample ended.
     """
-    names, ends = scalars(campaign), endings(campaign)
+    (names, others), ends = shown(campaign, _MOST_MOVED), endings(campaign)
     words, moved = moves(campaign)
     samples, has_run = campaign["sample"].to_numpy(), ran(campaign)
-    figure = Figure(figsize=(9.6, 1.4 * len(names) + 2.4))
-    panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    columns = 2 if len(samples) <= _FEW_MOVES and len(names) > _LOW_SHEET else 1
+    figure, panels, columns = style.new_panels(
+        len(names), 9.6 / columns, 1.5, 2.4, sharex=True, most=columns
+    )
     looks = looks_of(ends)
     for axes, name in zip(panels, names, strict=True):
         known, values = values_of(campaign, name)
         at = np.searchsorted(samples, known)
+        largest = np.abs(values).max(initial=0.0)
+        factor, units = readable(str(campaign[name].attrs.get("units", "1")), largest)
+        values = factor * values
         if 0 in at:
             axes.axhline(values[0], color=style.GREY, linewidth=0.9)
         # A sample without a value leaves a gap.
@@ -457,16 +467,17 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
             axes.set_ylim(middle - least, middle + least)
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.yaxis.set_major_locator(MaxNLocator(4))
-        says = campaign[name].attrs
-        title = style.meaning(str(says.get("long_name", name)))
-        title = unit_behind(title, str(says.get("units", "1")))
-        axes.set_title(title, fontsize=9.5)
+        axes.set_title(style.label(campaign[name], units, 120 // columns), fontsize=9.5)
     places = named(len(samples))
-    names_shown = [short(words[k]) for k in places]
-    panels[-1].set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
+    few = len(samples) <= _FEW_MOVES
+    fit = partial(textwrap.fill, width=28, max_lines=3, placeholder=" ...") if few else short
+    names_shown = [fit(words[k]) for k in places]
+    for axes in panels[-columns:]:
+        axes.set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
+        axes.tick_params(axis="x", labelbottom=True)
     panels[-1].set_xlim(-0.7, len(samples) - 0.3)
     legend(figure, [panels[0]], 4)
     counted = max(len(values_of(campaign, name)[0]) for name in names)
-    note = f"{told(campaign, counted)}. Line: the first sample, the base case."
+    note = f"{told(campaign, counted)}. Line: the first sample, the base case.{others}"
     head(figure, campaign, "One at a time", note)
     return figure
