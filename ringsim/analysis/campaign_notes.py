@@ -58,7 +58,7 @@ from ringsim.tables import (
     readable,
     with_unit,
 )
-from ringsim.variables import Variable
+from ringsim.variables import Fate, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,16 +80,20 @@ def notes(campaign: xr.Dataset) -> list[str]:
 def outcome_lines(campaign: xr.Dataset) -> list[str]:
     """What became of the antenna, and which runs failed: a line an end, with the first reason."""
     reasons = campaign["reason"].to_numpy() if "reason" in campaign else None
+    locks = "deployment_time" in campaign
     return ending_lines(
         campaign["outcome"].to_numpy(), campaign["status"].to_numpy(),
         lambda sample: "" if reasons is None else str(reasons[sample]),
+        np.isfinite(numbers(campaign, "deployment_time")) if locks else None,
     )  # fmt: skip
 
 
 def ending_lines(
-    fates: NDArray[Any], status: NDArray[Any], reason_of: Callable[[int], str]
-) -> list[str]:
-    """The same from codes of every sample and what finds the reason of one, "" if it is lost.
+    fates: NDArray[Any], status: NDArray[Any], reason_of: Callable[[int], str],
+    opened: NDArray[Any] | None = None,
+) -> list[str]:  # fmt: skip
+    """The same from codes of every sample and what finds the reason of one, "" if it is lost; and
+    from which have ``opened``, where that is known, since an overloaded ring may have.
 
     Counts are of the samples that have run.
     """
@@ -107,6 +111,8 @@ def ending_lines(
             why = f"sample {own[0]}: {why}"
         told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
         told = "" if word in REACHED else told
+        if opened is not None and word == Fate.OVERLOADED.words:
+            told = f", {int(opened[own].sum())} of them open{told}"
         if word != UNKNOWN:
             lines.append(f"{word.removeprefix(LOST)}: {len(own)} of {run}{told}")
     return lines

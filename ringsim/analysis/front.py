@@ -12,7 +12,15 @@ from ringsim.analysis.optimum import Found, Judged, Objective, Problem
 from ringsim.analysis.verdicts import Verdict
 from ringsim.files import whole, writing
 from ringsim.stepping.instant import Array
-from ringsim.tables import Table, counted, interval_text, number_text, readable, unit_text
+from ringsim.tables import (
+    Table,
+    bound_text,
+    counted,
+    interval_text,
+    number_text,
+    readable,
+    unit_text,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -223,7 +231,7 @@ def _designs(found: "xr.Dataset") -> Table:
         share, least = (found[f"probability{end}"].values[:, k] for end in ("", "_lower"))
         rows.append((f"{words}: share that meets it", *(number_text(v, 4) for v in share)))
         sure = f"at least, with confidence {float(found['confidence'].values[k]):g}"
-        rows.append((sure, *(number_text(v, 4) for v in least)))
+        rows.append((sure, *(bound_text(v, upper=False) for v in least)))
         name = found["requirement"].values[k]
         verdict = (Verdict(int(v)).words for v in found["verdict"].values[:, k])
         rows.append((f"verdict on {name}", *verdict))

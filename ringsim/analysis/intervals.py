@@ -508,8 +508,8 @@ def varies(campaign: xr.Dataset, name: str) -> bool:
 
 
 def same_within(campaign: xr.Dataset, name: str) -> float:
-    """The median error bar of an output if no sample is farther from the mean than that, so that
-    one value suits all; 0 if they differ by rounding alone, NaN if by more.
+    """The root mean square of the error bars of an output if no sample is farther from the mean
+    than that, so that one value suits all; 0 if they differ by rounding alone, NaN if by more.
     """
     own, bars = (numbers(campaign, each)[good(campaign)] for each in (name, f"{name}_error"))
     own, bars = own[np.isfinite(own)], bars[np.isfinite(bars)]
@@ -517,7 +517,7 @@ def same_within(campaign: xr.Dataset, name: str) -> float:
         return 0.0
     if not len(bars):
         return np.nan
-    bar = float(np.median(bars))
+    bar = float(np.sqrt(np.mean(bars**2)))
     return bar if np.abs(own - own.mean()).max() <= bar else np.nan
 
 

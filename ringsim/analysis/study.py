@@ -387,6 +387,7 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
             for side, each in enumerate((own, most))
         ]
     counts = [(own.sum(), most.sum() - own.sum()) for own, most in rows.values()]
+    opened = np.isfinite(numbers(campaign, "deployment_time"))
     population = placed.population
     return xr.Dataset(
         {
@@ -401,6 +402,12 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
                 "kind", np.array([n for _, n in counts], dtype="i8"),
                 about("failed runs, whose antennas may be of the kind, too"),
             ),
+            **({
+                "outcome_open": (
+                    "kind", np.array([int((own & opened).sum()) for own, _ in rows.values()]),
+                    about("samples of the kind in which all V-joints have locked"),
+                ),
+            } if "deployment_time" in campaign else {}),
             "outcome_share": (
                 "kind", shares[:, -1] if population else ends[:, 0], about("share of the kind"),
             ),

@@ -81,6 +81,7 @@ from ringsim.tables import (
     unit_behind,
     unit_text,
 )
+from ringsim.variables import Fate
 
 # Estimates for other distributions of inputs, as lines for people.
 
@@ -347,7 +348,13 @@ def outcome_table(analysis: xr.Dataset) -> Table:
         for kind in analysis["kind"].values
         for one in [analysis.sel(kind=kind)]
     ]  # fmt: skip
-    return Table(("outcome", "samples", "share", "95 % interval", *_parts()), rows)
+    notes = []
+    if (over := Fate.OVERLOADED.words) in analysis["kind"].values and "outcome_open" in analysis:
+        count, opened = (int(analysis.sel(kind=over)[f"outcome_{n}"]) for n in ("samples", "open"))
+        notes.append(
+            f"of {counted(count, 'sample')} {over}, {opened} had opened: all V-joints have locked"
+        )
+    return Table(("outcome", "samples", "share", "95 % interval", *_parts()), rows, notes)
 
 
 def _parts() -> list[str]:
@@ -386,7 +393,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
         if np.isfinite(bar):
             inside = f", mean {fine_text(mean, fine)}" * bool(np.isfinite(mean))
             told = f"{fine_text(least, fine)} .. {fine_text(most, fine)} {units}".rstrip()
-            within.append(f"{name} {told}{inside}, median error bar {bar:.2g}")
+            within.append(f"{name} {told}{inside}, error bars {bar:.2g}")
         if np.isfinite(least) and (every or np.isnan(bar) or name in wanted):
             low, high = (factor * analysis[f"{name}_interval"].values[0]).tolist()
             scatters = np.isfinite(analysis[f"{name}_error_of_mean"].values[0])
@@ -415,7 +422,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     return marked(Table(head, rows, [*notes, *[too_few()] * few]), analysis)
 
 
-_WITHIN = "no sample is farther from the mean than the numerical error"
+_WITHIN = "no sample is farther from the mean than the error bars (root mean square)"
 
 
 def too_few() -> str:

@@ -361,7 +361,9 @@ def _found(campaign: xr.Dataset, name: str, place: int) -> str:
     if np.isfinite(value):
         units = quantities()[name].units
         return with_unit(f"{value:.4g}", units)
-    why = first_clause(str(campaign["reason"].to_numpy()[place])) if "reason" in campaign else ""
+    reason = str(campaign["reason"].to_numpy()[place]) if "reason" in campaign else ""
+    why, how = first_clause(reason), reason.partition("; ")[0].partition(":")[0]
+    why = why if why.startswith(how) else f"{why}; {how}"  # over a limit: how far it came
     why = why or "no reason is told"
     return f"no value: {why}" if name else why
 

@@ -49,12 +49,12 @@ class BaseReaction(Output):
         ),
         Variable(
             "peak_base_force", (), "N", "largest force at the base at any step",
-            error_bar=ErrorBar("largest base force", safety=5.5, of="base_force"),
+            error_bar=ErrorBar("largest base force", safety=4.2, of="base_force"),
             summary=("largest base force", "10.3g"), worse="larger", largest_of="base_force",
         ),
         Variable(
             "peak_base_torque", (), "N m", "largest torque at the base at any step",
-            error_bar=ErrorBar("largest base torque", safety=4.0, of="base_torque"),
+            error_bar=ErrorBar("largest base torque", safety=2.1, of="base_torque"),
             summary=("largest base torque", "10.3g"), worse="larger", largest_of="base_torque",
         ),
         *(variable for peak in peaks for variable in peak.variables),
@@ -86,7 +86,7 @@ class BaseRotation(Output):
         ),
         Variable(
             "base_rotation_max", (), "degree", "largest rotation of the base at any step",
-            error_bar=ErrorBar("largest base rotation", safety=2.5, of="base_rotation"),
+            error_bar=ErrorBar("largest base rotation", safety=1.7, of="base_rotation"),
             summary=("largest base rotation", "10.3g"), worse="larger", largest_of="base_rotation",
         ),
         *peak.variables,

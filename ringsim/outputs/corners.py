@@ -41,7 +41,7 @@ class PeakAcceleration(Output):
         ),
         Variable(
             "peak_acceleration_max", (), "m/s^2", "largest acceleration of any corner at any step",
-            error_bar=ErrorBar("largest acceleration", safety=2.5, of="peak_acceleration"),
+            error_bar=ErrorBar("largest acceleration", safety=3.8, of="peak_acceleration"),
             summary=("largest acceleration", "10.3g"), worse="larger",
             largest_of="peak_acceleration",
         ),

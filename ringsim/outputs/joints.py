@@ -31,7 +31,7 @@ class OpeningAngle(Output):
     variables = (
         Variable(
             "opening_angle", ("plane", "section", "time"), "degree", "angle between the bar halves",
-            error_bar=ErrorBar("opening angles", safety=1.7),
+            error_bar=ErrorBar("opening angles", safety=1.5),
         ),
     )  # fmt: skip
 
@@ -58,12 +58,12 @@ class Asynchrony(Output):
         Variable(
             "asynchrony", ("time",), "degree",
             "largest difference of opening angles between V-joints",
-            error_bar=ErrorBar("asynchrony", safety=5.0),
+            error_bar=ErrorBar("asynchrony", safety=3.1),
         ),
         Variable(
             "asynchrony_max", (), "degree",
             "largest asynchrony up to the deployment time, or to the end of a run without one",
-            error_bar=ErrorBar("largest asynchrony", safety=1.4, of="asynchrony"),
+            error_bar=ErrorBar("largest asynchrony", safety=1.8, of="asynchrony"),
             summary=("largest asynchrony", "10.4f"), worse="larger", largest_of="asynchrony",
             round_off=1e-4,  # sections that are all alike run apart by up to 5e-6 deg
         ),
@@ -163,7 +163,7 @@ class Deployment(Output):
     variables = (
         Variable(
             "deployment_time", (), "s", "time at which the last V-joint reached 180 deg",
-            error_bar=ErrorBar("deployment time", safety=2.7, of="lock_time"),
+            error_bar=ErrorBar("deployment time", safety=1.5, of="lock_time"),
             summary=("deployment time", "10.4f"), worse="larger", largest_of="lock_time",
         ),
         Variable(
@@ -245,7 +245,7 @@ class FastestLatch(Output):
         Variable(
             "peak_latch_rate", (), "rad/s",
             "largest opening rate at which a V-joint first met its latch; missing if none did",
-            error_bar=ErrorBar("largest latch rate", safety=1.5, of="latch_rate"),
+            error_bar=ErrorBar("largest latch rate", safety=1.4, of="latch_rate"),
             summary=("largest latch rate", "10.3g"), worse="larger", largest_of="latch_rate",
         ),
         *LARGEST.variables,
@@ -304,7 +304,7 @@ class LockImpulse(Output):
         Variable(
             "peak_lock_impulse", (), "N m s",
             "largest angular impulse of a stop at a lock; missing if no V-joint has locked",
-            error_bar=ErrorBar("largest lock impulse", safety=1.2, of="lock_impulse"),
+            error_bar=ErrorBar("largest lock impulse", safety=1.7, of="lock_impulse"),
             summary=("largest lock impulse", "10.3g"), worse="larger", largest_of="lock_impulse",
         ),
         *peak.variables,

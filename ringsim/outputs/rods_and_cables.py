@@ -45,7 +45,7 @@ class CableTension(Output):
             "peak_tension", (), "N",
             "largest tension of any span of any cable until all V-joints have locked, or to the "
             "end of a run where latches do not catch",
-            error_bar=ErrorBar("largest tension", safety=2.6, of="cable_tension"),
+            error_bar=ErrorBar("largest tension", safety=1.4, of="cable_tension"),
             summary=("largest tension", "10.3f"), worse="larger", largest_of="cable_tension",
         ),
         *TENSION_PEAK.variables,
@@ -360,7 +360,7 @@ class RodStress(Output):
         ),
         Variable(
             "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod",
-            error_bar=ErrorBar("largest stress", safety=5.0, of="rod_stress"),
+            error_bar=ErrorBar("largest stress", safety=2.2, of="rod_stress"),
             summary=("largest rod stress", "10.4g"), worse="larger", largest_of="rod_stress",
         ),
         *STRESS_PEAK.variables,

@@ -117,8 +117,8 @@ def test_what_differs_by_less_than_its_numerical_error_is_one_value():
     least, most = made.peak_tension.values.min(), made.peak_tension.values.max()
     inside = f"{least:.4g} .. {most:.4g} N, mean {made.peak_tension.values.mean():.4g}"
     assert table.notes == [
-        f"no sample is farther from the mean than the numerical error: peak_tension {inside}, "
-        "median error bar 0.11"
+        "no sample is farther from the mean than the error bars (root mean square): "
+        f"peak_tension {inside}, error bars 0.11"
     ]
     assert told_of.count("peak_tension") == 1
     # --full has its statistics, and a requirement brings it into the tables.

@@ -9,14 +9,14 @@ from loops import for_each
 from made_campaign import made_campaign, with_motors
 
 from made import campaign
-from ringsim.analysis.campaign_notes import peak_lines
+from ringsim.analysis.campaign_notes import outcome_lines, peak_lines
 from ringsim.analysis.comparison import compare
 from ringsim.analysis.comparison_text import compared, sections
 from ringsim.analysis.design import median_and_worst
 from ringsim.analysis.intervals import quantities, worst_sample
 from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import statistics_table, told, verdict_lines
+from ringsim.analysis.study_text import outcome_table, statistics_table, told, verdict_lines
 from ringsim.analysis.worst import margin_table, worst_tables
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
@@ -96,10 +96,17 @@ def test_overloaded_antennas_are_ordered_by_their_load_and_tell_it() -> None:
     found = analyse(made, wanted)
     (table,) = (each for each in worst_tables(found, "f") if each.title.startswith("overloaded"))
     assert [row[:2] for row in table.rows] == [
-        (str(k), f"{20 + k} N at 5 s, more than limits.tension = 23.5 N") for k in (7, 6, 5)
-    ]
+        (str(k), f"{20 + k} N at 5 s, more than limits.tension = 23.5 N; "
+         "all V-joints have reached 180 deg") for k in (7, 6, 5)
+    ]  # fmt: skip
+    # Overloaded, a ring may be open all the same.
+    note = "of 4 samples overloaded, {} had opened: all V-joints have locked"
+    assert outcome_table(found).notes == [note.format(4)]
+    line = next(each for each in outcome_lines(made) if each.startswith("overloaded"))
+    assert line.startswith("overloaded: 4 of 8, 4 of them open (samples 4, 5, 6, 7): ")
     assert not any("ended before" in line for line in told(found))
     made["deployment_time"][7] = np.nan
+    assert outcome_table(analyse(made, wanted)).notes == [note.format(3)]
     assert any("1 of the 8 samples that meet it ended before" in line
                for line in told(analyse(made, wanted)))  # fmt: skip
 

@@ -84,7 +84,9 @@ def distributions(campaign: xr.Dataset) -> Figure:
     figure, panels, columns = style.new_panels(len(names), 3.7, 3.0, 0.9)
     short, allowed = False, allowables(campaign)
     rows = 1 if any(limits(campaign, name) or name in allowed for name in names) else 0
-    rows += any(limits(campaign, name) and name in allowed for name in names)
+    twice = [name for name in names if name in allowed and limits(campaign, name)]
+    twice = [n for n in twice if allowed[n] not in [limit for _, limit in limits(campaign, n)]]
+    rows += bool(twice)
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
         values, share = at_or_below(campaign, name)
         short = short or share[0] > 0.0 or share[-1] < 1.0
@@ -97,15 +99,21 @@ def distributions(campaign: xr.Dataset) -> Figure:
                       clip_on=False, zorder=4)  # fmt: skip
         words = f"n = {len(values)} of {campaign.sizes['sample']}"
         bounds = [(word, limit, 0) for word, limit in limits(campaign, name)]
-        if name in allowed and _FAR * allowed[name] > np.abs(values).max(initial=0.0):
+        if name in allowed and allowed[name] in [limit for _, limit, _ in bounds]:
+            pass  # required as it is allowed: one line, and one name
+        elif name in allowed and _FAR * allowed[name] > np.abs(values).max(initial=0.0):
             words += f"; limit {_told(campaign[name], allowed[name])}"
         elif name in allowed:
             bounds.append(("limit", allowed[name], 1 if bounds else 0))
-        for word, limit, row in bounds:
+        for word, limit, _ in bounds:
             axes.axvline(limit, color=style.VERMILION, linewidth=1.3,
                          linestyle=(0, (5, 2) if word != "limit" else (1.5, 1.5)))  # fmt: skip
-            # Above the frame, where no curve runs.
-            axes.annotate(f"{word} {_told(campaign[name], limit)}", (limit, 1.0), ha="center",
+        left, right = axes.get_xlim()
+        for word, limit, row in bounds:
+            place = (limit - left) / (right - left)
+            side = "left" if place < _NEAR_END else "right" if place > 1.0 - _NEAR_END else "center"
+            # Above the frame, where no curve runs, and not beyond its ends.
+            axes.annotate(f"{word} {_told(campaign[name], limit)}", (limit, 1.0), ha=side,
                           color=style.VERMILION, xycoords=axes.get_xaxis_transform(), fontsize=9,
                           textcoords="offset points", xytext=(0, 2 + 12 * row))  # fmt: skip
         axes.set_ylim(0.0, 1.02)
@@ -128,6 +136,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
     return figure
 
 
+_NEAR_END = 0.25
+"""Share of an axis from its ends within which a name centred on a limit would overhang."""
 _FAR = 0.3
 """Share of an allowable below which values would stand at the edge of an axis that has both."""
 
@@ -322,7 +332,7 @@ def _size(text: str) -> tuple[float, str]:
     "campaign",
     80,
     "The main number of each sample and its outcome, by each drawn input",
-    applies=_has_run,
+    applies=lambda campaign: _has_run(campaign) and not is_one_by_one(campaign),
 )
 def by_input(campaign: xr.Dataset) -> Figure:
     """A panel an input: the main number of each sample that has run over the value drawn for it;
@@ -346,8 +356,8 @@ def by_input(campaign: xr.Dataset) -> Figure:
     if others > 0:
         names = sorted(names, key=lambda each: -_together(drawn(campaign[each]), height))
         names = names[:MOST_PANELS]
-    figure, panels, columns = style.new_panels(len(names), 3.5, 2.8, 1.4)
-    for number, (axes, each) in enumerate(zip(panels, names, strict=True)):
+    figure, panels, _ = style.new_panels(len(names), 3.5, 2.8, 1.4)
+    for axes, each in zip(panels, names, strict=True):
         places, labels = drawn(campaign[each])
         _scatter(axes, places, height, words)
         if not known.size or (height == foot).any():
@@ -359,8 +369,9 @@ def by_input(campaign: xr.Dataset) -> Figure:
             axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.set_ylim(low - 0.24 * size, high + 0.1 * size)
         axes.set_xlabel(_label(campaign[each]), fontsize=9, labelpad=15)
-        if number % columns == 0 and name:
-            axes.set_ylabel(style.label(campaign[name], width=30), fontsize=9)
+    if name:
+        wide = int(9.0 * figure.get_size_inches()[1])  # letters that fit beside all rows
+        figure.supylabel(style.label(campaign[name], width=wide), fontsize=9)
     legend(figure, panels[:1], 4)
     lost = int((height == foot).sum())
     below = f"; the {lost} without this output are below the line" if lost else ""

@@ -47,7 +47,7 @@ from ringsim.plots.campaign.frame import (
     still,
 )
 from ringsim.stepping.instant import Array
-from ringsim.tables import counted, readable, unit_behind
+from ringsim.tables import counted, unit_behind
 
 MEASURES = {
     "total_index": "Total Sobol' index",
@@ -445,9 +445,6 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     for axes, name in zip(panels, names, strict=True):
         known, values = values_of(campaign, name)
         at = np.searchsorted(samples, known)
-        largest = np.abs(values).max(initial=0.0)
-        factor, units = readable(str(campaign[name].attrs.get("units", "1")), largest)
-        values = factor * values
         if 0 in at:
             axes.axhline(values[0], color=style.GREY, linewidth=0.9)
         # A sample without a value leaves a gap.
@@ -467,7 +464,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
             axes.set_ylim(middle - least, middle + least)
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.yaxis.set_major_locator(MaxNLocator(4))
-        axes.set_title(style.label(campaign[name], units, 120 // columns), fontsize=9.5)
+        axes.set_title(style.label(campaign[name], width=120 // columns), fontsize=9.5)
     places = named(len(samples))
     few = len(samples) <= _FEW_MOVES
     fit = partial(textwrap.fill, width=28, max_lines=3, placeholder=" ...") if few else short
