@@ -34,8 +34,8 @@ from ringsim.analysis.intervals import (
     share_bounds,
     standard_error,
 )
-from ringsim.analysis.requirements import OUTCOME, Requirement, violations
-from ringsim.analysis.verdicts import Verdict, rule_of, verdict_of
+from ringsim.analysis.requirements import OUTCOME, Requirement, rule_of, violations
+from ringsim.analysis.verdicts import Verdict, verdict_of
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml
 from ringsim.overrides import parse_value

@@ -15,8 +15,14 @@ from ringsim import extensions
 from ringsim.analysis import derived
 from ringsim.analysis.intervals import quantities, samples_needed
 from ringsim.analysis.optimum import Objective
-from ringsim.analysis.requirements import Requirements, beyond_joints
-from ringsim.analysis.verdicts import Condition, Looks, Rule, as_list
+from ringsim.analysis.requirements import (
+    Condition,
+    Looks,
+    Requirements,
+    Rule,
+    as_list,
+    beyond_joints,
+)
 from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text

@@ -24,8 +24,8 @@ import numpy as np
 
 from ringsim.analysis import derived
 from ringsim.analysis.design import placement
-from ringsim.analysis.requirements import OUTCOME, required_by
-from ringsim.analysis.verdicts import Rule, holds, rule_of
+from ringsim.analysis.requirements import OUTCOME, Rule, required_by, rule_of
+from ringsim.analysis.verdicts import holds
 from ringsim.campaign.folder import Folder
 from ringsim.files import whole
 from ringsim.refusal import InputError

@@ -9,9 +9,9 @@ from scipy.stats import binom
 from made import campaign
 from ringsim.analysis.design import placement
 from ringsim.analysis.intervals import samples_needed, share_bounds
-from ringsim.analysis.requirements import Requirement
+from ringsim.analysis.requirements import Condition, Requirement, Rule
 from ringsim.analysis.study import analyse
-from ringsim.analysis.verdicts import Condition, Rule, holds
+from ringsim.analysis.verdicts import holds
 
 RULE = Rule(conditions=[Condition(requirement="asynchrony_max")])
 MOST = 2500

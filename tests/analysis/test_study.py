@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.stats
 import xarray as xr
 from loops import for_each
+from made_campaign import made_campaign
 
 from made import campaign, points, response
 from ringsim.analysis.intervals import samples_needed, share_bounds
 from ringsim.analysis.requirements import to_json
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import OF_ERRORS, told
-from ringsim.analysis.verdicts import Verdict
+from ringsim.analysis.verdicts import Verdict, verdict_table
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
 
@@ -155,6 +157,26 @@ def test_samples_that_have_not_run_are_neither_used_nor_lost():
     assert found.asynchrony_max_samples.values.tolist() == [30, 0, 0, 10]
     assert found.samples_used.item() == 30
     assert verdict(found) == Verdict.NOT_YET_SHOWN
+
+
+def test_all_requirements_together_are_counted_with_the_bound_of_what_keeps_to_all():
+    """Failed runs keep to none; the confidence is the largest that was asked for."""
+    made = made_campaign(40, failed=(3,))
+    angles, loads = (made[name].values for name in ("asynchrony_max", "peak_tension"))
+    most = np.nanquantile(angles, 0.8), np.nanquantile(loads, 0.7)
+    kept = int(((angles <= most[0]) & (loads <= most[1]) & (made["status"].values == 0)).sum())
+    wanted = {
+        "asynchrony_max": {"max": most[0], "probability": 0.5, "confidence": 0.9},
+        "peak_tension": {"max": most[1], "probability": 0.5, "confidence": 0.95},
+    }
+    found = analyse(made, wanted)
+    assert int(found.together_samples) == kept < 0.8 * 40
+    assert int(found.together_of) == 40
+    least = scipy.stats.beta.ppf(0.05, kept, 40 - kept + 1)
+    assert float(found.together_probability_lower) == pytest.approx(least)
+    line = f"all 2 requirements together: {kept} of 40 samples meet them, a probability of at least"
+    assert any(note.startswith(line) for note in verdict_table(found).notes)
+    assert "together_of" not in analyse(made, {"peak_tension": wanted["peak_tension"]})
 
 
 def test_requirements_of_the_file_are_judged_and_outcomes_are():

@@ -10,7 +10,7 @@ import pytest
 from loops import for_each
 
 from campaign_bench import Bench, assert_same, finished, opened
-from ringsim.analysis.verdicts import Looks
+from ringsim.analysis.requirements import Looks
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
 
