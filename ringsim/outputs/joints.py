@@ -245,7 +245,7 @@ class FastestLatch(Output):
         Variable(
             "peak_latch_rate", (), "rad/s",
             "largest opening rate at which a V-joint first met its latch; missing if none did",
-            error_bar=ErrorBar("largest latch rate", safety=1.4, of="latch_rate"),
+            error_bar=ErrorBar("largest latch rate", safety=1.5, of="latch_rate"),
             summary=("largest latch rate", "10.3g"), worse="larger", largest_of="latch_rate",
         ),
         *LARGEST.variables,

@@ -141,6 +141,20 @@ def test_runs_that_agree_by_chance_in_the_largest_have_the_bar_of_their_places()
     assert found["peak_latch_rate_error"] == pytest.approx(safety * OF_DIFFERENCE * 0.04)
 
 
+def test_of_a_series_the_largest_size_at_each_place_counts() -> None:
+    """However many records either run has, and whichever sign and time the largest has there."""
+    pair = outcome(0.0), outcome(0.0)
+    for each, series in zip(pair, (
+        [[[1.0, 9.0, 2.0], [3.0, -4.0, 0.0], [np.nan] * 3]],
+        [[[9.0, 1.5], [4.2, 1.0], [np.nan] * 2]],
+    ), strict=True):  # fmt: skip
+        each.values["cable_tension"] = np.array(series)
+        each.values["peak_tension"] = np.array(9.0)
+    rms = np.sqrt(0.2**2 / 2.0)
+    expected = rules()["peak_tension"].safety * OF_DIFFERENCE * rms
+    assert error_bars(*pair)["peak_tension_error"] == pytest.approx(expected)
+
+
 def half_open(error: float, locked: int = 1) -> Outcome:
     """A run that ended with so many V-joints locked of two."""
     found = outcome(error)
