@@ -318,19 +318,26 @@ def _without_bars(found: xr.Dataset, every: Sequence[xr.DataArray]) -> list[str]
 
 
 def _changed(found: xr.Dataset) -> Table:
-    """The pairs whose outcome is another one."""
+    """The pairs whose outcome is another one, a row for each two outcomes."""
     changed, pairs = found.sizes["change"], found.attrs["pairs"]
     if not pairs or found.attrs["runs"]:
         return Table((), ())
     if not changed:
         return Table((), (), ["no outcome differs"])
-    names = ("changed_sample_first", "changed_outcome_first", "changed_outcome_second")
-    listed = zip(*(found[name].values[:_NAMED] for name in names), strict=True)
-    rows = [(str(sample), str(first), str(second)) for sample, first, second in listed]
+    names = ("changed_outcome_first", "changed_outcome_second", "changed_sample_first")
+    alike: dict[tuple[str, str], list[int]] = {}
+    for first, second, sample in zip(*(found[name].values for name in names), strict=True):
+        alike.setdefault((str(first), str(second)), []).append(int(sample))
+    rows = [
+        (*ends, str(len(samples)), ", ".join(map(str, samples[:_NAMED])) + ", ..." * (
+            len(samples) > _NAMED))
+        for ends, samples in alike.items()
+    ]  # fmt: skip
     notes = [f"the outcome differs in {changed} of {pairs}"]
-    if changed > _NAMED:
-        notes.append(f"{_NAMED} of them are listed; ringsim compare --out FILE.nc stores all")
-    return Table(("sample", *(f"in {name}" for name in names_of(found))), rows, notes, left=3)
+    if any(len(samples) > _NAMED for samples in alike.values()):
+        notes.append("ringsim compare --out FILE.nc stores all samples")
+    head = (*(f"in {name}" for name in names_of(found)), "pairs", "samples of the first")
+    return Table(head, rows, notes, left=4)
 
 
 def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
