@@ -69,7 +69,8 @@ class BaseReaction(Output):
         force, torque = series.on_grid()
         values: Values = {"base_force": force, "base_torque": torque}
         for peak, sizes in zip(self.peaks, np.linalg.norm(series.values, axis=2).T, strict=True):
-            values |= {peak.name: sizes.max()} | peak.of(run, series.times, sizes)
+            most, found = peak.of(run, series.times, sizes)
+            values |= found | {peak.name: np.asarray(most)}
         return values
 
 
@@ -102,10 +103,11 @@ class BaseRotation(Output):
     def reduce(self, run: Run, series: Series) -> Values:
         """In degrees."""
         sizes = np.degrees(np.linalg.norm(series.values, axis=1))
+        most, found = self.peak.of(run, series.times, sizes)
         return {
             "base_rotation": np.degrees(series.on_grid()),
-            "base_rotation_max": sizes.max(),
-        } | (self.peak.of(run, series.times, sizes) if sizes.any() else {})
+            "base_rotation_max": np.asarray(most),
+        } | (found if sizes.any() else {})
 
 
 # Whether the steps of a run were short enough for the shocks of its locks.

@@ -18,6 +18,7 @@ from ringsim.outputs.family import (
     Values,
     Variable,
     in_all_planes,
+    top_of,
 )
 
 # How hard corners are accelerated.
@@ -55,9 +56,13 @@ class PeakAcceleration(Output):
     def reduce(self, run: Run, series: Series) -> Values:
         """Of all steps."""
         sizes = np.linalg.norm(series.values, axis=3)
-        rows = in_all_planes(sizes.max(axis=0), run.scene.structure.planes)
-        values = {"peak_acceleration": rows, "peak_acceleration_max": sizes.max()}
-        return values | self.peak.of(run, series.times, sizes)
+        rows = np.empty(sizes.shape[1:])
+        for place in np.ndindex(*rows.shape):
+            rows[place] = top_of(series.times, sizes[(slice(None), *place)]).value
+        _, found = self.peak.of(run, series.times, sizes)
+        rows = in_all_planes(rows, run.scene.structure.planes)
+        largest = np.asarray(np.nanmax(rows))
+        return found | {"peak_acceleration": rows, "peak_acceleration_max": largest}
 
 
 # Where corners, pins, joints and the hub are.

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,6 +176,56 @@ _ROUND_OFF = 1e-6
 without a boom.  A boom, which holds one plane only, makes 3e-4."""
 
 
+class Top(NamedTuple):
+    """The largest of a series: its value, its time (s), and at which of the places."""
+
+    value: float
+    time: float
+    where: tuple[int, ...]
+
+
+def top_of(times: Array, values: Array) -> Top:
+    """The largest of values of the shape (times, *places), the first of equal ones; NaN counts as
+    none.
+
+    Between readings it is that of the parabola through the largest and its neighbours: the largest
+    reading alone is too small by up to an eighth of their bend, and two runs may agree in it by
+    chance.  It rises no more than the next slopes beyond the neighbours allow, which of a parabola
+    is nothing less: a level stretch that ends with a fall, as of a motor that stalls, has no slope,
+    and so no rise.  A reading near an end, beside a missing one, or beside a jump, which is two
+    readings of one time, stays what it is.
+
+    >>> times = np.array([0.0, 1.0, 2.5, 3.5, 4.0])
+    >>> top = top_of(times, 5.0 - (times - 2.3) ** 2)
+    >>> round(top.value, 12), round(top.time, 12)
+    (5.0, 2.3)
+    >>> top_of(np.arange(6.0), np.array([1.0, 2.0, 2.0, 2.0, 0.0, 0.0])).value
+    2.0
+    """
+    flat = values.reshape(len(values), -1)
+    moment, place = divmod(int(np.nanargmax(flat)), flat.shape[1])
+    where, course = tuple(map(int, np.unravel_index(place, values.shape[1:]))), flat[:, place]
+    stay = Top(float(course[moment]), float(times[moment]), where)
+    near = slice(moment - 2, moment + 3)
+    if moment < 2 or moment > len(times) - 3:
+        return stay
+    steps, slopes = np.diff(times[near]), np.diff(course[near])
+    if not (np.isfinite(slopes).all() and (steps > 0.0).all()):
+        return stay
+    slopes = slopes / steps
+    (_, up, down, _), (first, before, after, last) = slopes, steps
+    bend = (up - down) / (before + after)
+    slope = up - bend * before  # at the largest reading
+    longest = max(before, after)
+    most = 0.25 * longest**2 * min(
+        max(slopes[0], 0.0) / (first + before), max(-slopes[3], 0.0) / (after + last)
+    )  # fmt: skip
+    if bend <= 0.0:
+        return stay
+    rise = float(min(0.25 * slope**2 / bend, most))
+    return Top(stay.value + rise, stay.time + float(0.5 * slope / bend) * (rise > 0.0), where)
+
+
 @dataclass(frozen=True)
 class Peak:
     """Variables ``NAME_time`` and ``NAME_DIM`` for each dimension of a reading."""
@@ -197,13 +247,13 @@ class Peak:
         )
         return (Variable(f"{self.name}_time", (), "s", f"time of {self.words}"), *where)
 
-    def of(self, run: Run, times: Array, values: Array) -> Values:
-        """Of values with the shape (times, *dims); the first of equal ones, NaN counts as none."""
-        moment, *where = np.unravel_index(int(np.nanargmax(values)), values.shape)
-        found: Values = {f"{self.name}_time": times[moment]}
-        for dim, place in zip(self.dims, where, strict=True):
+    def of(self, run: Run, times: Array, values: Array) -> tuple[float, Values]:
+        """The largest of values of the shape (times, *dims), and its variables; see ``top_of``."""
+        top = top_of(times, values)
+        found: Values = {f"{self.name}_time": np.asarray(top.time)}
+        for dim, place in zip(self.dims, top.where, strict=True):
             found[f"{self.name}_{dim}"] = run.coordinates[dim][place]
-        return found
+        return top.value, found
 
     def at(self, run: Run, times: Array, values: Array) -> Values:
         """Of values that each place has at a time of its own, both of shape (*dims); nothing where
@@ -281,8 +331,10 @@ __all__ = [
     "Run",
     "Series",
     "SpanNames",
+    "Top",
     "Values",
     "Variable",
+    "top_of",
 ]
 
 

@@ -168,7 +168,8 @@ class Motors(Output):
             values |= _electrical(series, current, supplied, supplied - power, taken)
         for peak, own in zip(self.peaks, (torque, power, current), strict=True):
             if np.isfinite(own).any():  # no current of motors that do not tell their constant
-                values |= {peak.name: np.nanmax(own)} | peak.of(run, times, own)
+                most, places = peak.of(run, times, own)
+                values |= places | {peak.name: np.asarray(most)}
         values["total_motor_energy"] = np.nansum(energy[-1])
         if np.isfinite(lagged).any():
             known = np.isfinite(lagged).any(axis=0)

@@ -25,6 +25,7 @@ from ringsim.outputs.family import (
     axes,
     holds,
     output_times,
+    top_of,
 )
 from ringsim.outputs.joints import missed
 from ringsim.outputs.meters import together
@@ -220,13 +221,13 @@ def overloads(
     for output in outputs:
         most = getattr(scene.limits, output.limit) if output.limit else None
         series = None if most is None else series_of(output)
-        if series is None:
+        if series is None or most is None:
             continue
-        largest = np.nanmax(series.values.reshape(len(series.times), -1), axis=1)
-        if largest.max() > most:
-            unit, time = output.variables[0].units, series.times[largest.argmax()]
+        top = top_of(series.times, series.values)
+        if top.value > most:
+            unit = output.variables[0].units
             found += (
-                f"; {with_unit(f'{largest.max():.4g}', unit)} at {time:.6g} s, "
+                f"; {with_unit(f'{top.value:.4g}', unit)} at {top.time:.6g} s, "
                 f"more than limits.{output.limit} = {with_unit(f'{most:g}', unit)}"
             )
     return found

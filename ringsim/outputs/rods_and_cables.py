@@ -63,8 +63,8 @@ class CableTension(Output):
             before, last = times <= until, np.array([until])
             times = np.append(times[before], last)
             values = np.append(values[before], series.at(last), axis=0)
-        peak = {"peak_tension": np.nanmax(values)} | TENSION_PEAK.of(run, times, values)
-        return super().reduce(run, series) | peak
+        most, peak = TENSION_PEAK.of(run, times, values)
+        return super().reduce(run, series) | peak | {"peak_tension": np.asarray(most)}
 
 
 # Tension of the cables along a net's edge.
@@ -99,8 +99,8 @@ class NetTension(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated, and the largest reading."""
-        values, peak = super().reduce(run, series), PEAK_OF_NET.of(run, series.times, series.values)
-        return values | peak | {"peak_net_tension": np.nanmax(series.values)}
+        most, peak = PEAK_OF_NET.of(run, series.times, series.values)
+        return super().reduce(run, series) | peak | {"peak_net_tension": np.asarray(most)}
 
 
 # How long cables were slack.
@@ -372,8 +372,8 @@ class RodStress(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated, and the largest reading."""
-        values, peak = super().reduce(run, series), STRESS_PEAK.of(run, series.times, series.values)
-        return values | peak | {"peak_rod_stress": np.nanmax(series.values)}
+        most, peak = STRESS_PEAK.of(run, series.times, series.values)
+        return super().reduce(run, series) | peak | {"peak_rod_stress": np.asarray(most)}
 
 
 # Bending strain of the rod that carries a structure's gauge.

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.cli import cli
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import BaseReaction
 from ringsim.outputs.corners import PeakAcceleration
-from ringsim.outputs.family import Run, Series, axes
+from ringsim.outputs.family import Run, Series, axes, top_of
 from ringsim.outputs.joints import Asynchrony
 from ringsim.outputs.motors import DriveMargins
 from ringsim.outputs.rods_and_cables import CableTension, NetTension, RodStress
@@ -35,6 +36,42 @@ def run_of(angles, rates, until=np.nan) -> tuple[Run, Series]:
 
 
 STILL = run_of(np.ones((9, 2, 2)), np.zeros((9, 2, 2)))[0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_summit_between_readings_is_found_on_uneven_steps(seed: int) -> None:
+    """Of cos(t - t0) the largest reading lacks up to h^2 / 8, the parabola a hundredth of that."""
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.05, 0.1, 60))
+    summit = float(rng.uniform(2.0, 3.0))
+    curves = np.stack([0.9 * np.cos(times - summit), np.cos(times - summit)], axis=1)
+    top = top_of(times, curves)
+    assert top.where == (1,)
+    assert top.value == pytest.approx(1.0, abs=1e-2 * 0.1**2 / 8.0)
+    assert top.time == pytest.approx(summit, abs=2e-3)
+    assert top.value >= curves.max()
+
+
+@for_each(("course", "why"), [
+    ([0.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0], "level, as of a motor at its limit, and off"),
+    ([0.0, 1.0, 2.0, 3.0, 4.0, 0.0, 0.0], "cut at its largest"),
+    ([0.0, 0.0, 4.0, 3.0, 2.0, 1.0, 0.0], "begun at its largest"),
+    ([5.0, 4.0, 3.0, 2.0, 1.0, 0.0, 0.0], "at the start"),
+    ([0.0, 1.0, 3.0, 4.0, np.nan, np.nan, np.nan], "beside a reading that is missing"),
+])  # fmt: skip
+def test_where_nothing_rises_between_readings_the_largest_of_them_counts(
+    course: list[float], why: str
+) -> None:
+    top = top_of(np.arange(7.0), np.array(course))
+    assert top.value == np.nanmax(course), why
+    assert top.time == np.nanargmax(course), why
+
+
+def test_no_summit_lies_across_a_jump() -> None:
+    """Two readings of one time, as where a fault strikes."""
+    times = np.array([0.0, 1.0, 2.0, 2.0, 3.0, 4.0, 5.0])
+    top = top_of(times, np.array([0.0, 1.0, 1.5, 3.0, 2.9, 2.0, 1.0]))
+    assert (top.value, top.time) == (3.0, 2.0)
 
 
 @pytest.mark.parametrize("leads", [1.0, -1.0])
@@ -86,6 +123,7 @@ def test_tension_tells_plane_and_span() -> None:
     tensions = np.random.default_rng(3).uniform(1.0, 2.0, (9, 2, 6))
     tensions[:, 0, 5] = np.nan  # of a cable with fewer spans
     tensions[6, 1, 3] = 30.0
+    tensions[[5, 7], 1, 3] = 1.5  # alike on both sides, so that the parabola's summit is there
     found = CableTension().reduce(STILL, Series(TIMES, tensions, STILL.angles.grid))
     assert found["peak_tension"] == 30.0
     assert found["peak_tension_time"] == TIMES[6]
@@ -117,6 +155,7 @@ def test_planes_that_pull_alike_are_told_together() -> None:
     """To round-off, up to the peak; the far winch's span of both planes is alike, too."""
     tensions = np.random.default_rng(3).uniform(1.0, 2.0, (9, 1, 6)) * np.ones((1, 2, 1))
     tensions[:, 1] *= 1.0 + 1e-10
+    tensions[[3, 5], :, 3] = 1.5
     tensions[4, :, 3] = 30.0, 30.0 * (1.0 + 1e-10)
     words = "at 1 s: upper and lower, span 4"
 
