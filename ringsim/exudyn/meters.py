@@ -279,6 +279,13 @@ class FullMeters(Meters):
         gravity = np.zeros(3) if layout.gravity is None else layout.gravity
         return body_reaction(craft, self.bodies().axes[base], moving - gravity, *turning)
 
+    def spin(self) -> Array:
+        """That of the node that carries the boom's upper end."""
+        base = self.layout.base
+        assert base is not None
+        node = self._model.bodies[base][1]
+        return np.asarray(self._system.GetNodeOutput(node, _KIND.AngularVelocity), dtype=float)
+
     @cached_property
     def _points(self) -> tuple[Indices, list[int], Array, Indices]:
         """Coordinates of all points; which stand aside of their nodes, their arms and turns."""

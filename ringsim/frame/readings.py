@@ -111,6 +111,17 @@ class FrameMeters(Meters):
         arms = state.place.points[own] - state.pose.place[self.layout.base]
         return -np.array([pulled.sum(axis=0), np.cross(arms, pulled).sum(axis=0)])
 
+    def spin(self) -> Array:
+        """That of the rigid motion of its four points, by least squares: the sum of r x v is J w,
+        with J = sum(r^2 1 - r r^T), r and v from their means.
+        """
+        own, state = self._model.mesh.craft, self._state
+        arms, rates = (each - each.mean(axis=0) for each in (
+            state.place.points[own], state.rate.points[own]
+        ))  # fmt: skip
+        tensor = np.sum(arms**2) * np.eye(3) - arms.T @ arms
+        return np.asarray(np.linalg.solve(tensor, np.cross(arms, rates).sum(axis=0)))
+
     def _elements(self, places: Places) -> Indices:
         if places not in self._known:
             self._known[places] = np.array([self._first[rod] + k for rod, k in places])

@@ -110,6 +110,37 @@ class BaseRotation(Output):
         } | (found if sizes.any() else {})
 
 
+class BaseRate(Output):
+    """Angular velocity of the spacecraft, as its attitude control has to bear it."""
+
+    rank = 47
+    needs = ("reactions", "spacecraft")
+    peak = Peak("base_rate_max", (), "the largest rate of the spacecraft")
+    variables = (
+        Variable(
+            "base_rate", ("axis", "time"), "degree/s",
+            "angular velocity of the spacecraft, in axes that do not turn",
+        ),
+        Variable(
+            "base_rate_max", (), "degree/s", "largest angular velocity of the spacecraft",
+            error_bar=ErrorBar("largest rate of the spacecraft", safety=2.0, of="base_rate"),
+            summary=("largest base rate", "10.3g"), worse="larger", largest_of="base_rate",
+        ),
+        *peak.variables,
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array:
+        """Shape (3,), rad/s."""
+        return now.meters.spin()
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """In degrees a second."""
+        sizes = np.degrees(np.linalg.norm(series.values, axis=1))
+        most, found = self.peak.of(run, series.times, sizes)
+        values = {"base_rate": np.degrees(series.on_grid()), "base_rate_max": np.asarray(most)}
+        return values | (found if sizes.any() else {})
+
+
 # Whether the steps of a run were short enough for the shocks of its locks.
 #
 # One function a consequence: peaks at base and corners, and rates at which latches are met.

@@ -79,6 +79,10 @@ class Meters:
         """
         raise NotImplementedError
 
+    def spin(self) -> Array:
+        """Angular velocity of the spacecraft, shape (3,), rad/s, in axes that do not turn."""
+        raise NotImplementedError
+
     # What follows.
 
     def coordinates(self) -> dict[str, NDArray[Any]]:

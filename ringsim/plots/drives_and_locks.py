@@ -177,10 +177,10 @@ def _loads(dataset: xr.Dataset) -> list[xr.DataArray]:
 
 @picture("run", 118, "Attitude and place of the base, force and torque on it", applies=_based)
 def base(dataset: xr.Dataset) -> Figure:
-    """Of a base that moves ``base_rotation`` (axis, time) and, where positions are recorded, how
-    far the boom's upper end has moved since the start; ``base_force`` and ``base_torque`` where
-    they are recorded.  A line an axis; of loads also their magnitude, a dot at its largest value of
-    all steps, which is a point of that curve alone.
+    """Of a base that moves ``base_rotation`` (axis, time), of a spacecraft ``base_rate``, too, and,
+    where positions are recorded, how far the boom's upper end has moved since the start;
+    ``base_force`` and ``base_torque`` where they are recorded.  A line an axis; of loads also their
+    magnitude, a dot at its largest value of all steps, which is a point of that curve alone.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     shown, told, body = [], list[str](), "base"
@@ -188,6 +188,9 @@ def base(dataset: xr.Dataset) -> Figure:
         words = "rotation vector since the start"
         shown, told = [dataset["base_rotation"].assign_attrs(long_name=words)], ["attitude"]
         body = "spacecraft" if scene.spacecraft is not None else "free base"
+        if "base_rate" in dataset:
+            shown.append(dataset["base_rate"].assign_attrs(long_name="angular velocity"))
+            told.append("rate")
         if "position" in dataset:
             shown.append(_way(dataset, scene))
             told.append("place")

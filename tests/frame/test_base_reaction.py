@@ -128,6 +128,24 @@ def test_a_free_base_gives_nothing() -> None:
     assert float(course.outcome.values["base_rotation_max"]) > 0.01
 
 
+def test_the_rate_of_the_spacecraft_is_the_derivative_of_its_rotation() -> None:
+    """The rate is read of velocities, the rotation of axes; small turns' vectors just add up."""
+    fine = {"solver.end_time": 1.0, "record.interval": 0.01, "solver.tolerance": 1e-4}
+    scene = ring("ring18-cable", spacecraft=CRAFT).with_values(fine)
+    runs = by_frames(scene), by_exudyn(scene)
+    for run in runs:
+        rates, turned = run.values["base_rate"], run.values["base_rotation"]
+        slope = np.gradient(turned, 0.01, axis=1)[:, 2:-2]
+        assert np.abs(slope - rates[:, 2:-2]).max() < 2e-3 * np.abs(rates).max()
+        largest = float(run.values["base_rate_max"])
+        sizes = np.linalg.norm(rates, axis=0)
+        assert sizes.max() <= largest < 1.01 * sizes.max()
+        near = np.interp(float(run.values["base_rate_max_time"]), run.coordinates["time"], sizes)
+        assert near == pytest.approx(largest, rel=2e-3)
+    here, there = (run.values["base_rate"] for run in runs)
+    assert np.abs(here - there).max() < 2e-3 * np.abs(there).max()
+
+
 @pytest.mark.parametrize(
     "values",
     [

@@ -134,17 +134,19 @@ def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
     }  # fmt: skip
     run = simulate(load_scene("ring18-cable").with_values(values))
     ((_, figure),) = figures_of(run, "base")
-    turn, _, force, _ = figure.axes
+    turn, rate, _, force, _ = figure.axes
     known = run["base_rotation"].dropna("time")
     way = run["position"].sel(point="upper corner 1").dropna("time")
     loads = (run[name].dropna("time") for name in ("base_force", "base_torque"))
-    drawn = zip(figure.axes, (known, way - way[..., 0], *loads), strict=True)
+    turning = run["base_rate"].dropna("time")
+    drawn = zip(figure.axes, (known, turning, way - way[..., 0], *loads), strict=True)
     for axes, wanted in drawn:
         for row, line in zip(wanted.transpose("axis", "time").values, axes.lines, strict=False):
             assert line.get_ydata()[: len(row)] == pytest.approx(row)
     assert "(deg)" in turn.get_ylabel()
+    assert "(deg/s)" in rate.get_ylabel()
     assert "(N)" in force.get_ylabel()
-    told = "Attitude, place, force and torque of the spacecraft"
+    told = "Attitude, rate, place, force and torque of the spacecraft"
     assert " ".join(figure.get_suptitle().split()).startswith(told)
     # A peak that records miss is told with how far these are apart, and no other one.
     size = float((run["base_force"] ** 2).sum("axis").max() ** 0.5)
@@ -153,7 +155,7 @@ def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
         seen = run.assign(peak_base_force=high).drop_vars("peak_base_force_time")
         seen = seen.assign(peak_base_force_time=between) if missed else seen
         ((_, figure),) = figures_of(seen, "base")
-        (words,) = (t.get_text() for t in figure.axes[2].texts if "largest" in t.get_text())
+        (words,) = (t.get_text() for t in figure.axes[3].texts if "largest" in t.get_text())
         apart = float(run["time"][1] - run["time"][0])
         every = f"curves: records every {apart:.3g} s, and the largest of all steps"
         assert (every in words) == missed
@@ -163,7 +165,7 @@ def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
     ((_, figure),) = figures_of(still, "base")
     assert figure.get_suptitle().startswith("Force and torque of the base")
     assert len(figure.axes) == 2
-    bare = run.drop_vars(["base_force", "base_torque", "position"])
+    bare = run.drop_vars(["base_rate", "base_force", "base_torque", "position"])
     ((_, figure),) = figures_of(bare, "base")
     assert figure.get_suptitle().startswith("Attitude of the spacecraft")
     assert not list(figures_of(still.drop_vars(["base_force", "base_torque"]), "base"))
