@@ -23,7 +23,7 @@ from ringsim.outputs.family import SPAN_NAME, axes, holds, span_names
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stored_state import layout_fingerprint
-from ringsim.variables import Fidelity, Outcome, Variable, flags_of
+from ringsim.variables import OF_CAMPAIGNS, Fidelity, Outcome, Variable, flags_of
 
 
 def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
@@ -158,6 +158,8 @@ def _undeclared(name: str, variable: xr.Variable, found: xr.Dataset) -> str:
         return "holds a value twice, or none" if again else ""
     # A place that an output tells, such as peak_tension_span, is one that the file has.
     dim = own.rpartition("_")[2]
+    if OF_CAMPAIGNS in declared.needs:  # a number of the user's own, whatever it is called
+        return ""
     if declared.dims or dim not in COORDINATES or dim == "time" or dim not in found.coords:
         return ""
     known = {*np.atleast_1d(found[dim].to_numpy()).tolist(), -1, ""}

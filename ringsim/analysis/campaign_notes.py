@@ -112,7 +112,7 @@ def ending_lines(
         told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
         told = "" if word in REACHED else told
         if opened is not None and word == Fate.OVERLOADED.words:
-            told = f", {int(opened[own].sum())} of them open{told}"
+            told = f", {int(opened[own].sum())} of them with all V-joints locked{told}"
         if word != UNKNOWN:
             lines.append(f"{word.removeprefix(LOST)}: {len(own)} of {run}{told}")
     return lines

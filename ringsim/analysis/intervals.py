@@ -11,9 +11,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ringsim.outputs import COORDINATES, OUTPUTS
+from ringsim.outputs import COORDINATES, OUTPUTS, VARIABLES
 from ringsim.outputs.family import Array
-from ringsim.variables import GOALS, Status, Variable
+from ringsim.variables import GOALS, OF_CAMPAIGNS, Status, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -435,14 +435,16 @@ CHECKED = "_checked"
 
 
 def quantities() -> dict[str, Variable]:
-    """All numbers without dimensions that tell of the antenna, and are no places."""
+    """All numbers without dimensions that tell of the antenna, and are no places; all of the user's
+    own, whatever their names end with.
+    """
     places = COORDINATES.keys() - {"time"}
     return {
         each.name: each
         for output in OUTPUTS if output.of_antenna
         for each in output.variables
         if not each.dims and each.flags is None and each.dtype != "str"
-        and each.name.rpartition("_")[2] not in places
+        and (each.name.rpartition("_")[2] not in places or OF_CAMPAIGNS in output.needs)
     }  # fmt: skip
 
 
@@ -482,7 +484,9 @@ def of_both_engines() -> set[str]:
 def is_moment(output: str) -> bool:
     """Whether it is when a peak was: what it depends on is told at length alone."""
     known = quantities().get(output)
-    return known is not None and output.endswith("_time") and not known.badness
+    if known is None or OF_CAMPAIGNS in VARIABLES[output].needs:
+        return False
+    return output.endswith("_time") and not known.badness
 
 
 def numbers(campaign: xr.Dataset, name: str) -> Array:

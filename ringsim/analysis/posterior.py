@@ -495,20 +495,29 @@ _WRONG = {
 def _verdict(found: xr.Dataset) -> list[str]:
     """Whether the model explains the data, and what was left out."""
     notes = list[str]()
+    widest = float(found["off"].max())
     if not _is_explained(found):
         beyond = found["chance"].values * found.sizes["sensor"] < UNEXPLAINED
         names = ", ".join(found["sensor"].values[beyond])
         why = [f"{names} differ by more than scatter"] if names else []
         why += [words for test, words in _WRONG.items()
                 if 3.0 * float(found["chance_of_all"].sel(test=test)) < UNEXPLAINED]  # fmt: skip
+        cause = (
+            "no values of these unknowns near the posterior give these readings. The model lacks "
+            "something, numerical errors (solver.tolerance) count, or sigma is too small"
+        )
+        # Then the posterior itself may be wrong, and with it what it does not explain.
+        if widest > 1.0:
+            cause = (
+                "the stages have not come to values that give these readings. Give more runs and "
+                "stages before the model is blamed"
+            )
         notes.append(
-            f"NOT EXPLAINED: {'; '.join(why)}: no values of these unknowns near the posterior give "
-            "these readings. The model lacks something, numerical errors (solver.tolerance) count, "
-            "or sigma is too small; the intervals above are too narrow then"
+            f"NOT EXPLAINED: {'; '.join(why)}: {cause}; the intervals above are too narrow then"
         )
     else:
         notes.append("the posterior explains every sensor within the scatter of its readings")
-    if (widest := float(found["off"].max())) > 1.0:
+    if widest > 1.0:
         notes.append(
             f"runs of the last stage lie {widest:.2g} sigma off a linear map: use more stages, or "
             "look whether two separate sets of values explain the readings"

@@ -351,9 +351,8 @@ def outcome_table(analysis: xr.Dataset) -> Table:
     notes = []
     if (over := Fate.OVERLOADED.words) in analysis["kind"].values and "outcome_open" in analysis:
         count, opened = (int(analysis.sel(kind=over)[f"outcome_{n}"]) for n in ("samples", "open"))
-        notes.append(
-            f"of {counted(count, 'sample')} {over}, {opened} had opened: all V-joints have locked"
-        )
+        told = f"of {counted(count, 'sample')} {over}, {opened} opened all the same"
+        notes.append(f"{told}: all V-joints locked")
     return Table(("outcome", "samples", "share", "95 % interval", *_parts()), rows, notes)
 
 

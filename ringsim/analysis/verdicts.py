@@ -377,7 +377,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
                 f"({low} .. {high}, each bound with the confidence required)"
             )
         elif not bad and used and np.isfinite(one["probability_lower"]):
-            most = bound_text(1.0 - one["probability_lower"], 3, upper=True)
+            most = bound_text(1.0 - one["probability_lower"], upper=True)
             never.setdefault((most, f"{one['confidence_required']:g}"), []).append(str(name))
         if verdict != alone:
             notes.append(

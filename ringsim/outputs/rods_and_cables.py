@@ -156,8 +156,8 @@ class LongestSlack(Output):
     variables = (
         Variable(
             "longest_slack", (), "s",
-            "longest time for which a span was slack without a break, until its plane has locked "
-            "or its rope has parted",
+            "longest time for which a span held more free rope than limits.slack_length, until its "
+            "plane has locked or its rope has parted",
             summary=("longest slack", "10.3g"), worse="larger",
         ),
         *PEAK_OF_SLACK.variables,

@@ -284,6 +284,9 @@ def test_they_count_as_all_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     outputs = """
 pull = { of = "max(cable_tension(plane='upper'))", meaning = "largest pull", worse = "larger" }
 apart = "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
+when_time = "argmax(asynchrony)"
+apart_span = "max(asynchrony)"
+last_section = "argmax(max(max(opening_angle, over='plane'), over='time'), over='section')"
 """
     more = "[requirements]\npull = { max = 1e3, probability = 0.5, confidence = 0.5 }"
     Path("own.toml").write_text(FILE.format(outputs=outputs, more=more), encoding="utf-8")
@@ -312,6 +315,9 @@ apart = "max(abs(opening_angle(plane='upper') - opening_angle(plane='lower')))"
     assert "apart <= 90 deg" in told
     verdicts = analyse(xr.open_dataset("runs/own/campaign.nc"))
     assert verdicts["pull"].sel(statistic="maximum").item() == pull.max().item()
+    # Those that are named as the time or place of something stand in the tables, too.
+    lines = "\n".join(statistics_table(verdicts).lines())
+    assert all(name in lines for name in ("when_time", "apart_span", "last_section"))
 
     outputs = outputs.replace("largest pull", "least pull").replace("max(cable", "min(cable")
     Path("own.toml").write_text(FILE.format(outputs=outputs, more=more), encoding="utf-8")

@@ -100,10 +100,11 @@ def test_overloaded_antennas_are_ordered_by_their_load_and_tell_it() -> None:
          "all V-joints have reached 180 deg") for k in (7, 6, 5)
     ]  # fmt: skip
     # Overloaded, a ring may be open all the same.
-    note = "of 4 samples overloaded, {} had opened: all V-joints have locked"
+    note = "of 4 samples overloaded, {} opened all the same: all V-joints locked"
     assert outcome_table(found).notes == [note.format(4)]
     line = next(each for each in outcome_lines(made) if each.startswith("overloaded"))
-    assert line.startswith("overloaded: 4 of 8, 4 of them open (samples 4, 5, 6, 7): ")
+    told_of = "overloaded: 4 of 8, 4 of them with all V-joints locked (samples 4, 5, 6, 7): "
+    assert line.startswith(told_of)
     assert not any("ended before" in line for line in told(found))
     made["deployment_time"][7] = np.nan
     assert outcome_table(analyse(made, wanted)).notes == [note.format(3)]

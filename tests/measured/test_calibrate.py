@@ -18,6 +18,7 @@ from click.testing import CliRunner
 from loops import for_each
 
 import ringsim
+from ringsim.analysis.posterior import calibration_tables
 from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
 from ringsim.cli import cli
 from ringsim.measured import load_measured
@@ -195,6 +196,14 @@ def test_what_is_printed_is_what_the_file_holds(test_files, found):
     assert [float(v) for v in cells[4].split(" .. ")] == pytest.approx([low, high], rel=2e-3)
     assert "hardly learnt from these sensors: rods.poisson_ratio" in done.output
     assert "the posterior explains every sensor" in done.output
+    # Readings that the model cannot give, and those that the stages have not come to.
+    wrong = posterior.assign(chance=0.0 * posterior["chance"])
+    for off, words in (0.2, "The model lacks something"), (3.0, "the stages have not come to"):
+        _, verdict = calibration_tables(wrong.assign(off=0.0 * posterior["off"] + off))
+        text = "\n".join(verdict.notes)
+        assert "NOT EXPLAINED" in text
+        assert words in text
+        assert ("The model lacks" in text) == (off < 1.0)
     assert f"wrote {folder / POSTERIOR}" in done.output
     first = done.output.splitlines()[0]
     assert first == "cal: 48 runs in 3 stages of 16, one after the other; what has run is kept"

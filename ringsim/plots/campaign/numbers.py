@@ -83,10 +83,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
     names, flat = shown(campaign)
     figure, panels, columns = style.new_panels(len(names), 3.7, 3.0, 0.9)
     short, allowed = False, allowables(campaign)
-    rows = 1 if any(limits(campaign, name) or name in allowed for name in names) else 0
-    twice = [name for name in names if name in allowed and limits(campaign, name)]
-    twice = [n for n in twice if allowed[n] not in [limit for _, limit in limits(campaign, n)]]
-    rows += bool(twice)
+    titles, rows = list[str](), 0
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
         values, share = at_or_below(campaign, name)
         short = short or share[0] > 0.0 or share[-1] < 1.0
@@ -98,19 +95,21 @@ def distributions(campaign: xr.Dataset) -> Figure:
             axes.plot(quantile(values, _LEVELS), heights, "o", color=style.INK, markersize=4,
                       clip_on=False, zorder=4)  # fmt: skip
         words = f"n = {len(values)} of {campaign.sizes['sample']}"
-        bounds = [(word, limit, 0) for word, limit in limits(campaign, name)]
-        if name in allowed and allowed[name] in [limit for _, limit, _ in bounds]:
+        bounds = list(limits(campaign, name))
+        if name in allowed and allowed[name] in [limit for _, limit in bounds]:
             pass  # required as it is allowed: one line, and one name
         elif name in allowed and _FAR * allowed[name] > np.abs(values).max(initial=0.0):
             words += f"; limit {_told(campaign[name], allowed[name])}"
         elif name in allowed:
-            bounds.append(("limit", allowed[name], 1 if bounds else 0))
-        for word, limit, _ in bounds:
+            bounds.append(("limit", allowed[name]))
+        for word, limit in bounds:
             axes.axvline(limit, color=style.VERMILION, linewidth=1.3,
                          linestyle=(0, (5, 2) if word != "limit" else (1.5, 1.5)))  # fmt: skip
-        left, right = axes.get_xlim()
-        for word, limit, row in bounds:
+        (left, right), row, before = axes.get_xlim(), -1, -1.0
+        for word, limit in sorted(bounds, key=lambda bound: bound[1]):
             place = (limit - left) / (right - left)
+            row = row + 1 if place - before < _NAME_WIDE and row >= 0 else 0
+            rows, before = max(rows, row + 1), place
             side = "left" if place < _NEAR_END else "right" if place > 1.0 - _NEAR_END else "center"
             # Above the frame, where no curve runs, and not beyond its ends.
             axes.annotate(f"{word} {_told(campaign[name], limit)}", (limit, 1.0), ha=side,
@@ -121,9 +120,11 @@ def distributions(campaign: xr.Dataset) -> Figure:
         style.plain_numbers(axes.xaxis)
         axes.set_xlabel(style.label(campaign[name], width=38))
         style.few_ticks(axes)
-        axes.set_title(words, fontsize=9, pad=4.0 + 12.0 * rows if rows else None)
+        titles.append(words)
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
+    for axes, words in zip(panels, titles, strict=True):
+        axes.set_title(words, fontsize=9, pad=4.0 + 12.0 * rows if rows else None)
     most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
     dots = "" if of_cases(campaign) else " Dots: quantiles of 5, 50 and 95 % of the values."
     notes = f"{dots}{blocks}{flat}"
@@ -136,6 +137,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
     return figure
 
 
+_NAME_WIDE = 0.6
+"""Share of an axis that the names of two bounds take: nearer ones are on two lines."""
 _NEAR_END = 0.25
 """Share of an axis from its ends within which a name centred on a limit would overhang."""
 _FAR = 0.3

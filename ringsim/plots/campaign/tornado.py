@@ -399,7 +399,7 @@ def _row(
 
 _MOST_NAMED = 72
 """Moves up to which each has its name on the axis."""
-_MOST_MOVED, _FEW_MOVES, _LOW_SHEET = 14, 24, 6
+_MOST_MOVED, _FEW_MOVES, _LOW_SHEET = 18, 24, 6
 """Panels of a sheet; moves that half its width can name, and panels up to which it needs no two
 columns."""
 _LEAST_SPAN = 0.02
