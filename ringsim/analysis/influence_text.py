@@ -376,7 +376,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
         twice = measure in _CHANCE and bool(_correlated(analysis))
         how = " by its index or its partial rank correlation" * twice
         outputs, often = len(quiet) + sum(bool(row[0]) for row in rows), 10 if twice else 20
-        many = f", so up to {outputs / often:.2g} of the {outputs} outputs tested"
+        many = f", so up to {outputs / often:.3g} of the {outputs} outputs tested"
         notes.append(
             f"by chance alone, fewer than one output in {often} would have an input listed{how}"
             f"{many * (outputs >= often)} ({count} in all, sections, means and differences "

@@ -413,8 +413,9 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     if unsaid := [row[0] for row in rows if row[-2] == "-"]:
         known = derived.known_from(analysis.attrs).items()
         own = [name for name, each in known if name in unsaid and each.worse is None]
-        cure = f' (of {", ".join(own)} worse = "larger" or "smaller" under [outputs] says it)'
-        notes.append(f"no worst sample where neither end is known to be worse{cure * bool(own)}")
+        cure = f'; of {", ".join(own)} worse = "larger" or "smaller" under [outputs] tells'
+        told = "no worst sample of outputs of which large values are as good as small ones"
+        notes.append(f"{told}{cure * bool(own)}")
     notes += filter(None, [analysis.attrs.get(RECORDED)])
     if within:
         notes.append(f"{_WITHIN}: {'; '.join(within)}")

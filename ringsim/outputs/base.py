@@ -123,7 +123,7 @@ class BaseRate(Output):
         ),
         Variable(
             "base_rate_max", (), "degree/s", "largest angular velocity of the spacecraft",
-            error_bar=ErrorBar("largest rate of the spacecraft", safety=2.0, of="base_rate"),
+            error_bar=ErrorBar("largest rate of the spacecraft", safety=2.4, of="base_rate"),
             summary=("largest base rate", "10.3g"), worse="larger", largest_of="base_rate",
         ),
         *peak.variables,

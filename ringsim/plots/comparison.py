@@ -293,7 +293,7 @@ def _bands_told(campaign: xr.Dataset, name: str = "") -> str:
 
 
 _OVER = (
-    "After its end a run counts on: a deployed ring with 180 deg and in step, everything else\n"
+    "A run that has ended still counts: a deployed ring with 180 deg and in step, everything else\n"
     "with its last value."
 )
 _DEPLOYED = {"opening_angle": 180.0, "asynchrony": 0.0}

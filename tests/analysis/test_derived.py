@@ -401,8 +401,8 @@ def test_what_is_required_on_one_side_tells_which_end_is_worse(
     assert int(found["far_apart_worst_sample"]) == worst
     (row,) = (row for row in statistics_table(found).rows if row[0] == "far_apart")
     assert row[-2] == ("-" if worst < 0 else str(worst))
-    cure = 'no worst sample where neither end is known to be worse (of far_apart worse = "larger" '
-    unsaid = any(note.startswith(cure) for note in statistics_table(found).notes)
+    cure = '; of far_apart worse = "larger" or "smaller" under [outputs] tells'
+    unsaid = any(note.endswith(cure) for note in statistics_table(found).notes)
     assert unsaid == (worst < 0 and not more)
     one = {"far_apart": bound | BOUND} if bound else {}
     assert int(analyse(made, one)["far_apart_worst_sample"]) == worst
