@@ -32,6 +32,7 @@ from ringsim.files import parse_toml, read_text, require_regular
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.units import ListIn, Model, Second, Unit
+from ringsim.variables import OF_CAMPAIGNS
 
 _UNITS = {
     "s": {"s": 1.0, "ms": 1e-3, "min": 60.0},
@@ -262,13 +263,20 @@ def _planned(file: Measured, sensor: Sensor) -> Readings:
     return Readings(sensor, times, np.full(len(times), np.nan), deviation, 0, 0)
 
 
+def is_instant(variable: str) -> bool:
+    """Whether a variable in s is a time of the run's clock; one of the user's own, whatever it is
+    called, is taken for a duration.
+    """
+    return variable.endswith("_time") and OF_CAMPAIGNS not in VARIABLES[variable].needs
+
+
 def _read(file: Measured, sensor: Sensor, columns: dict[str, Array]) -> Readings:
     deviation = sensor.scale * sensor.standard_deviation
     if sensor.value is not None or file.clock is None:
         value = sensor.scale * ((sensor.value or 0.0) - sensor.bias)
         if VARIABLES[sensor.variable].units == "s" and file.clock is not None:
             # A duration, as of a slack rope, has no place in time.
-            instant = sensor.variable.endswith("_time")
+            instant = is_instant(sensor.variable)
             value = file.clock.offset * instant + (1.0 + file.clock.drift) * value
         return Readings(sensor, np.full(1, np.nan), np.array([value]), deviation, 0, 0)
     clock = file.clock

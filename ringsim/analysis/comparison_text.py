@@ -25,7 +25,7 @@ from ringsim.tables import (
 )
 from ringsim.variables import Fate
 
-_NAMED, _VALUES = 20, 60
+_NAMED, _VALUES = 12, 60
 """Changed outcomes, and values of scenes, that are listed at most."""
 _ALIKE = 1e-3
 """Difference over the larger mean below which neither is told to be worse, however sure it is."""
@@ -336,7 +336,8 @@ def _changed(found: xr.Dataset) -> Table:
     notes = [f"the outcome differs in {changed} of {pairs}"]
     if any(len(samples) > _NAMED for samples in alike.values()):
         notes.append("ringsim compare --out FILE.nc stores all samples")
-    head = (*(f"in {name}" for name in names_of(found)), "pairs", "samples of the first")
+    both = names_of(found)
+    head = (*(f"in {name}" for name in both), "pairs", f"samples of {both[0]}")
     return Table(head, rows, notes, left=4)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from ringsim.measured import Measurement, Readings
+from ringsim.measured import Measurement, Readings, is_instant
 from ringsim.outputs.family import VARIABLES, axes, holds, supply
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene
@@ -182,7 +182,7 @@ def predictions(
             each, name = values.to_numpy().astype(float), readings.sensor.variable
             if VARIABLES[name].units == "s" and clock is not None:
                 # Back to what the file's clock would have shown of an instant, or of a duration.
-                each = (each - shift * name.endswith("_time")) / scale
+                each = (each - shift * is_instant(name)) / scale
             found.append(each[:, None])
             continue
         times, rows = values["time"].to_numpy(), values.transpose("sample", "time").to_numpy()

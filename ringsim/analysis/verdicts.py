@@ -120,26 +120,34 @@ def judge(
     )  # fmt: skip
     for name in ("verdict", "verdict_of_used"):
         found[name].attrs |= flags_of(Verdict)
-    return found.assign(_together(campaign, requirements, placed))
+    return found.assign(_together(campaign, requirements, placed, rule))
 
 
 def _together(
-    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement
-) -> dict[str, Any]:
+    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement,
+    rule: Rule | None,
+) -> dict[str, Any]:  # fmt: skip
     """Samples that keep to all of several requirements, of those that have run, and the lower bound
-    of their probability with the largest confidence of them all; failed runs keep to none.
+    of their probability with the largest confidence of them all, at all looks of a rule at once as
+    their own bounds; failed runs keep to none.
     """
-    if len(requirements) < 2:
-        return {}
     run = good(campaign) | lost(campaign)
+    if len(requirements) < 2 or not run.any():
+        return {}
     kept = good(campaign).copy()
     for name, wanted in requirements.items():
         kept &= ~violations(campaign, name, wanted)
     sure, least = max(each.confidence for each in requirements.values()), np.nan
-    if placed.population and run.any():
-        least = bounds(kept[run], campaign["sample"].to_numpy()[run], (sure, sure), placed)[0]
+    looked = int(run.sum())
+    level = sure if rule is None else max(
+        rule.levels(name, wanted, looked, placed.replicates)[0]
+        for name, wanted in requirements.items()
+    )  # fmt: skip
+    if placed.population:
+        least = bounds(kept[run], campaign["sample"].to_numpy()[run], (level, level), placed)[0]
     return {
         "together_samples": ((), int(kept.sum()), about("samples that keep to all requirements")),
+        "together_lost": ((), int(lost(campaign).sum()), about("of these, failed runs")),
         "together_of": ((), int(run.sum()), about("samples that have run, failed ones too")),
         "together_probability_lower": (
             (), least, about("lower bound of the probability to keep to all requirements"),
@@ -336,6 +344,8 @@ def _together_told(analysis: xr.Dataset, count: int) -> str:
     names = ("samples", "of", "probability_lower", "confidence")
     kept, run, least, sure = (float(analysis[f"together_{name}"]) for name in names)
     told = f"all {count} requirements together: {kept:.0f} of {run:.0f} samples meet them"
+    if failed := int(analysis["together_lost"]):
+        told += f" ({counted(failed, 'failed run')} counted as not meeting them)"
     if np.isfinite(least):
         bound = bound_text(least, upper=False)
         told += f", a probability of at least {bound} (confidence {sure:g})"

@@ -299,8 +299,8 @@ class Progress:
             self.failed += result.status.failed
             self._bar.set_postfix(self._counts(), refresh=False)
             self._bar.update()
+        self._pause = _PLAIN_SECONDS
         if time.monotonic() - self._told > _PLAIN_SECONDS:
-            self._pause = _PLAIN_SECONDS
             self._tell_counts()
 
     def _tell_counts(self, more: str = "") -> None:

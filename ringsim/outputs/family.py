@@ -188,12 +188,13 @@ def top_of(times: Array, values: Array) -> Top:
     """The largest of values of the shape (times, *places), the first of equal ones; NaN counts as
     none.
 
-    Between readings it is that of the parabola through the largest and its neighbours: the largest
-    reading alone is too small by up to an eighth of their bend, and two runs may agree in it by
-    chance.  It rises no more than the next slopes beyond the neighbours allow, which of a parabola
-    is nothing less: a level stretch that ends with a fall, as of a motor that stalls, has no slope,
-    and so no rise.  A reading near an end, beside a missing one, or beside a jump, which is two
-    readings of one time, stays what it is.
+    Between readings it is that of the parabola through a reading that is larger than its
+    neighbours, and these: the largest reading alone is too small by up to h^2 |f''| / 8 at steps of
+    h, and two runs may agree in it by chance.  The parabola rises no more than the next slopes
+    beyond the neighbours allow, a bound that no true parabola reaches: a level stretch that ends
+    with a fall, as of a motor that stalls, has no slope, and so no rise; nor do two equal readings.
+    A reading near an end, beside a missing one, or beside a jump, which is two readings of one
+    time, stays what it is.
 
     >>> times = np.array([0.0, 1.0, 2.5, 3.5, 4.0])
     >>> top = top_of(times, 5.0 - (times - 2.3) ** 2)
@@ -203,27 +204,28 @@ def top_of(times: Array, values: Array) -> Top:
     2.0
     """
     flat = values.reshape(len(values), -1)
-    moment, place = divmod(int(np.nanargmax(flat)), flat.shape[1])
-    where, course = tuple(map(int, np.unravel_index(place, values.shape[1:]))), flat[:, place]
-    stay = Top(float(course[moment]), float(times[moment]), where)
-    near = slice(moment - 2, moment + 3)
-    if moment < 2 or moment > len(times) - 3:
-        return stay
-    steps, slopes = np.diff(times[near]), np.diff(course[near])
-    if not (np.isfinite(slopes).all() and (steps > 0.0).all()):
-        return stay
-    slopes = slopes / steps
-    (_, up, down, _), (first, before, after, last) = slopes, steps
-    bend = (up - down) / (before + after)
-    slope = up - bend * before  # at the largest reading
-    longest = max(before, after)
-    most = 0.25 * longest**2 * min(
-        max(slopes[0], 0.0) / (first + before), max(-slopes[3], 0.0) / (after + last)
-    )  # fmt: skip
-    if bend <= 0.0:
-        return stay
-    rise = float(min(0.25 * slope**2 / bend, most))
-    return Top(stay.value + rise, stay.time + float(0.5 * slope / bend) * (rise > 0.0), where)
+    tops, shift = flat.astype(float), np.zeros(flat.shape)
+    if len(times) > 4:
+        steps = np.diff(times)[:, None]
+        with np.errstate(all="ignore"):
+            slopes = np.diff(flat, axis=0) / steps
+            first, up, down, last = slopes[:-3], slopes[1:-2], slopes[2:-1], slopes[3:]
+            before, after = steps[1:-2], steps[2:-1]
+            bend = (up - down) / (before + after)
+            slope = up - bend * before  # at the reading
+            most = 0.25 * np.fmax(before, after) ** 2 * np.minimum(
+                first / (steps[:-3] + before), -last / (after + steps[3:])
+            )  # fmt: skip
+            rise = np.minimum(0.25 * slope**2 / bend, most)
+            # NaN, beside what is missing, is no rise, and a step without length is a jump.
+            apart = (steps[:-3] > 0.0) & (before > 0.0) & (after > 0.0) & (steps[3:] > 0.0)
+            rises = apart & (up > 0.0) & (down < 0.0) & np.isfinite(rise) & (rise > 0.0)
+            tops[2:-2] += np.where(rises, rise, 0.0)
+            shift[2:-2] = np.where(rises, 0.5 * slope / bend, 0.0)
+    moment, place = divmod(int(np.nanargmax(tops)), flat.shape[1])
+    where = tuple(map(int, np.unravel_index(place, values.shape[1:])))
+    time = float(times[moment]) + float(shift[moment, place])
+    return Top(float(tops[moment, place]), time, where)
 
 
 @dataclass(frozen=True)
@@ -411,11 +413,12 @@ class Output:
         """Values of its variables, from what ``read`` gave at all instants of a run.
 
         Unless said otherwise the first variable is the reading, interpolated in time, and the
-        second of two the largest magnitude of a reading.
+        second of two its largest magnitude, as ``top_of`` has it.
         """
         values: Values = {self.variables[0].name: series.on_grid()}
         if len(self.variables) == 2:
-            values[self.variables[1].name] = np.abs(series.values).max()
+            largest = top_of(series.times, np.abs(series.values)).value
+            values[self.variables[1].name] = np.asarray(largest)
         return values
 
     def told(self, values: Values, span_names: SpanNames) -> str:

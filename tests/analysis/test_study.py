@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import scipy.stats
@@ -174,8 +176,16 @@ def test_all_requirements_together_are_counted_with_the_bound_of_what_keeps_to_a
     assert int(found.together_of) == 40
     least = scipy.stats.beta.ppf(0.05, kept, 40 - kept + 1)
     assert float(found.together_probability_lower) == pytest.approx(least)
-    line = f"all 2 requirements together: {kept} of 40 samples meet them, a probability of at least"
+    line = f"all 2 requirements together: {kept} of 40 samples meet them (1 failed run counted as "
+    line += "not meeting them), a probability of at least"
     assert any(note.startswith(line) for note in verdict_table(found).notes)
+    # Where looks share the error, so does the bound of all: no more than that of any.
+    rule = {"conditions": [{"requirement": name} for name in wanted], "looks": {"first": 8}}
+    made.attrs["stop_when"] = json.dumps(rule)
+    looked = analyse(made, wanted)
+    least = float(looked.together_probability_lower)
+    assert least < float(found.together_probability_lower)
+    assert least <= float(looked.probability_lower.min())
     assert "together_of" not in analyse(made, {"peak_tension": wanted["peak_tension"]})
 
 

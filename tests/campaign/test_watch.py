@@ -92,10 +92,20 @@ def test_what_runs_is_told_where_nothing_ends_for_long(
             patched.setattr(watch.time, "monotonic", lambda now=now: float(now))
             progress.refresh()
         progress.finished(SimpleNamespace(sample=check_of(4), status=Status.OK))
+        # Also where it ended soon after a line, and said nothing itself.
+        for number, begin in ((0, 200), (1, 240)):
+            patched.setattr(watch.time, "monotonic", lambda begin=begin: float(begin))
+            progress.started(number)
+            for now in range(begin, begin + 35):
+                patched.setattr(watch.time, "monotonic", lambda now=now: float(now))
+                progress.refresh()
+            progress.finished(SimpleNamespace(sample=number, status=Status.OK))
         progress.close("done")
     assert capsys.readouterr().err.splitlines() == [
         "x: 1 of 2 samples done, 1 worker, 1 check to run",
         "x: 1 of 2 done, 0 failed, 0 of 1 checks; running: check of 4, for 31 s",
         "x: 1 of 2 done, 0 failed, 0 of 1 checks; running: check of 4, for 92 s",
         "x: 1 of 2 done, 0 failed, 1 of 1 checks",
+        "x: 1 of 2 done, 0 failed, 1 of 1 checks; running: sample 0, for 30 s",
+        "x: 2 of 2 done, 0 failed, 1 of 1 checks; running: sample 1, for 21 s",
     ]

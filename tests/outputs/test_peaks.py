@@ -18,6 +18,7 @@ from ringsim.outputs.corners import PeakAcceleration
 from ringsim.outputs.family import Run, Series, axes, top_of
 from ringsim.outputs.joints import Asynchrony
 from ringsim.outputs.motors import DriveMargins
+from ringsim.outputs.recorder import overloads
 from ringsim.outputs.rods_and_cables import CableTension, NetTension, RodStress
 from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES, simulate
@@ -35,6 +36,7 @@ def run_of(angles, rates, until=np.nan) -> tuple[Run, Series]:
     return Run(TRUSS, *series, np.full((2, 2), until), {}, known), series[0]
 
 
+LIMITED = TRUSS.with_values({"limits.tension": 5.1})
 STILL = run_of(np.ones((9, 2, 2)), np.zeros((9, 2, 2)))[0]
 
 
@@ -65,6 +67,31 @@ def test_where_nothing_rises_between_readings_the_largest_of_them_counts(
     top = top_of(np.arange(7.0), np.array(course))
     assert top.value == np.nanmax(course), why
     assert top.time == np.nanargmax(course), why
+
+
+def test_the_summit_may_be_at_another_place_or_time_than_the_largest_reading() -> None:
+    times = np.arange(7.0)
+    curves = np.stack([5.0 - (times - 3.0) ** 2, 5.2 - (times - 3.45) ** 2], axis=1)
+    top = top_of(times, curves)
+    assert (top.value, top.time, top.where) == (pytest.approx(5.2), pytest.approx(3.45), (1,))
+    # What is between readings alone is over a limit, too, and corners tell the same one.
+    assert overloads(LIMITED, [CableTension()], lambda _: Series(times, curves, times)).startswith(
+        "; 5.2 N at 3.45 s, more than limits.tension = 5.1 N"
+    )
+    pulls = np.zeros((7, 2, 3, 3))
+    pulls[:, 0, 0, 0], pulls[:, 1, 2, 0] = curves.T + 30.0
+    run = replace(STILL, coordinates=STILL.coordinates | {"corner": np.arange(1, 4)})
+    found = PeakAcceleration().reduce(run, Series(times, pulls, times))
+    assert found["peak_acceleration_max"] == pytest.approx(35.2) == found["peak_acceleration"].max()
+    assert (found["peak_acceleration_max_plane"], found["peak_acceleration_max_corner"]) == (
+        "lower", 3
+    )  # fmt: skip
+
+
+def test_the_slopes_beyond_the_neighbours_bound_the_rise() -> None:
+    """Of 2, 3, 3.9, 0, -4 at steps of 1 the parabola would rise by 0.23, the bound by 0.125."""
+    course = np.array([2.0, 3.0, 3.9, 0.0, -4.0])
+    assert top_of(np.arange(5.0), course).value == pytest.approx(3.9 + 0.125)
 
 
 def test_no_summit_lies_across_a_jump() -> None:
