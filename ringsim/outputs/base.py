@@ -102,12 +102,7 @@ class BaseRotation(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """In degrees."""
-        sizes = np.degrees(np.linalg.norm(series.values, axis=1))
-        most, found = self.peak.of(run, series.times, sizes)
-        return {
-            "base_rotation": np.degrees(series.on_grid()),
-            "base_rotation_max": np.asarray(most),
-        } | (found if sizes.any() else {})
+        return _in_degrees("base_rotation", self.peak, run, series)
 
 
 class BaseRate(Output):
@@ -135,10 +130,15 @@ class BaseRate(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """In degrees a second."""
-        sizes = np.degrees(np.linalg.norm(series.values, axis=1))
-        most, found = self.peak.of(run, series.times, sizes)
-        values = {"base_rate": np.degrees(series.on_grid()), "base_rate_max": np.asarray(most)}
-        return values | (found if sizes.any() else {})
+        return _in_degrees("base_rate", self.peak, run, series)
+
+
+def _in_degrees(name: str, peak: Peak, run: Run, series: Series) -> Values:
+    """A vector over time and its largest magnitude, with its time if it is not zero throughout."""
+    sizes = np.degrees(np.linalg.norm(series.values, axis=1))
+    most, found = peak.of(run, series.times, sizes)
+    values: Values = {name: np.degrees(series.on_grid()), peak.name: np.asarray(most)}
+    return values | (found if sizes.any() else {})
 
 
 # Whether the steps of a run were short enough for the shocks of its locks.
