@@ -23,7 +23,7 @@ from ringsim.analysis.requirements import (
     as_list,
     beyond_joints,
 )
-from ringsim.choice import kind_of, kinds_of
+from ringsim.choice import kind_of, kinds_of, load_package
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
 from ringsim.outputs.balance import instead_of
@@ -45,6 +45,8 @@ from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
 from ringsim.units import ListIn, Model
 from ringsim.variables import GONE, OF_CAMPAIGNS
+
+load_package("ringsim.sampling.designs")  # all kinds that a file may choose
 
 SOLVERS = {
     "full": "ringsim.simulation:run",

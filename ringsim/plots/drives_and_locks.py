@@ -206,10 +206,11 @@ def base(dataset: xr.Dataset) -> Figure:
                       label=f"{axis} axis")  # fmt: skip
         axes.set_ylabel(style.label(values, width=30), fontsize=9)
         axes.margins(y=0.12)
-        if values.name in _LOADS:
+        if values.name in (*_LOADS, "base_rate"):
             # Of readings at output times; the shock of a lock lies between two of them.
             size = (values**2).sum("axis", skipna=False) ** 0.5
-            peak = peak_of(dataset.assign(size=size), "size", f"peak_{values.name}")
+            largest = f"peak_{values.name}" if values.name in _LOADS else "base_rate_max"
+            peak = peak_of(dataset.assign(size=size), "size", largest)
             axes.plot(*peak.within(size), color=style.GREY, linewidth=0.9, zorder=1.5,
                       label="magnitude")  # fmt: skip
             mark(axes, peak, str(values.attrs["units"]), "", curve=size)

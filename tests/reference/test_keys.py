@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import subprocess
+import sys
 import tomllib
 
 import pytest
@@ -164,3 +166,16 @@ def test_paths_are_those_of_files() -> None:
     assert "inputs.*.mean" in paths("campaign")
     assert "requirements.*.is" in paths("campaign")
     assert facts(find("solver.step")[0].key) == "number in s; 1e-09 .. 1e+06; default 0.2"
+
+
+def test_every_kind_of_design_is_known_to_whoever_reads_a_campaign_file() -> None:
+    """In a process of its own: others have imported more than that takes."""
+    words = (
+        "from ringsim.campaign.specification import Specification; "
+        "from ringsim.reference.tree import find; print(find('design')[0].key.form)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", words], capture_output=True, text=True, check=True
+    ).stdout
+    for kind in ("grid", "list", "one-at-a-time", "random", "sobol", "subset-simulation"):
+        assert kind in told

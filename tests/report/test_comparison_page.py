@@ -189,7 +189,7 @@ def test_what_is_over_counts_on_in_the_courses(both: tuple[xr.Dataset, xr.Datase
     assert opening[time > 6.0] == pytest.approx(180.0)
     time, tension = drawn["Largest cable tension (N)"].T
     assert tension[-1] == pytest.approx(tensions[middle].max(axis=(0, 1))[~late][-1])
-    assert "After its end a run counts on" in figure.legends[0].get_title().get_text()
+    assert "A run that has ended still counts" in figure.legends[0].get_title().get_text()
 
 
 def test_a_sample_that_runs_on_ends_no_axis_of_a_comparison() -> None:
