@@ -26,6 +26,7 @@ from ringsim.analysis.study_text import statistics_table, told, verdict_lines
 from ringsim.campaign import merging
 from ringsim.campaign.specification import Campaign, campaign_of
 from ringsim.cli import cli
+from ringsim.measured import is_instant
 from ringsim.outputs import VARIABLES
 from ringsim.plots.campaign.numbers import convergence
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
@@ -344,6 +345,12 @@ last_section = "argmax(max(max(opening_angle, over='plane'), over='time'), over=
 def test_names_that_mean_something_are_refused(name: str) -> None:
     with pytest.raises(InputError, match="outputs"):
         of(f"{json.dumps(name)} = 'peak_tension'")
+
+
+def test_a_number_of_the_users_own_is_a_duration_for_the_clock_of_a_test() -> None:
+    of("spread_time = 'difference(lock_time)'")
+    assert not is_instant("spread_time")
+    assert is_instant("deployment_time")
 
 
 def test_requirements_are_not_at_fault_where_another_output_is_refused() -> None:

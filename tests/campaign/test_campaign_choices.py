@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 from loops import for_each
 
 from ringsim.campaign.specification import load_campaign
+from ringsim.cli.campaign import changed
 from ringsim.refusal import InputError
 
 CHOOSING = """
@@ -133,6 +135,14 @@ def test_choices_reach_the_runs_and_the_merged_file(bench):
     more = bench.run(*start[:2], "--out", "out", solver="", code=2)
     assert "this folder has another campaign (its scene differs: solver.tolerance" in more
     assert "is not in the range" in bench.run(*start[:2], "--samples", 0, code=2)
+
+
+@pytest.mark.quick
+def test_a_changed_stress_is_told_in_its_unit_with_the_bar_of_either_side():
+    old = {"peak_rod_stress": np.array(5e6)}
+    new = {"peak_rod_stress": np.array(6e6), "peak_rod_stress_error": np.array(2e4)}
+    (line,) = changed(new, old)
+    assert " ".join(line.split()) == "largest rod stress 5 MPa -> 6 +- 0.02 MPa (+20 %)"
 
 
 @pytest.mark.quick
