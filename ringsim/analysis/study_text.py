@@ -413,8 +413,8 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     if unsaid := [row[0] for row in rows if row[-2] == "-"]:
         known = derived.known_from(analysis.attrs).items()
         own = [name for name, each in known if name in unsaid and each.worse is None]
-        cure = f'; of {", ".join(own)} worse = "larger" or "smaller" under [outputs] tells'
-        told = "no worst sample of outputs of which large values are as good as small ones"
+        told = "worst sample '-': large values of the output are no worse than small ones"
+        cure = f'; of {", ".join(own)}, worse = "larger" or "smaller" under [outputs] says which are'
         notes.append(f"{told}{cure * bool(own)}")
     notes += filter(None, [analysis.attrs.get(RECORDED)])
     if within:

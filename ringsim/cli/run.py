@@ -29,6 +29,7 @@ from ringsim.outputs.base import DOUBT, may_be_off
 from ringsim.parts.solver import Solver
 from ringsim.refusal import EXIT_DONE, EXIT_FAILED, InputError
 from ringsim.scene import Scene, load_scene
+from ringsim.scene.checks import doubtful
 from ringsim.stepping.instant import Instant, Watch
 from ringsim.stored_state import require_fit
 from ringsim.variables import GONE, Outcome
@@ -139,6 +140,8 @@ def run_command(
     asked = ("frame", "full") if fidelity == "both" else (fidelity or "frame",)
     for name in asked:
         require_fit(start, chosen, name)
+    for line in doubtful(chosen):
+        click.echo(f"doubtful: {line}")
     engines = {"frame": partial(run_frame, start=start), "full": partial(run, start=start)}
     try:
         outcomes = {name: watched(engines[name], chosen) for name in asked}

@@ -162,7 +162,7 @@ class Roped(NamedTuple):
             table, ropes.behind, winches, Drums.still(count), Spans.empty(ropes),
             Seen.empty(pulleys), np.zeros(pulleys), np.ones(count), np.zeros((most, spans)),
             np.zeros((most, spans, 3)), np.zeros((2, most, points, 3)),
-            Border.empty(unknowns, most, hub),
+            Border.empty(unknowns, most, points, hub),
         )  # fmt: skip
 
 

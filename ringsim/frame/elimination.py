@@ -63,9 +63,10 @@ class Fronts(NamedTuple):
 
 
 class Border(NamedTuple):
-    """Room for columns and rows of the border, shape (unknowns * k,), for its own block, (k * k,),
-    factored with pivots, (k,); what is in use: its number of columns, and whether the first three
-    are a hub's, (2,).
+    """Room for columns of the border, shape (unknowns * k,), for rows of a hub, (3 * unknowns,),
+    for how the ropes' points move with each column, (3 * points * k,), and for its own block,
+    (k * k,), factored with pivots, (k,); what is in use: its number of columns, whether the first
+    three are a hub's, and factors of the ropes, (3,).
 
     k is a whole number of eights: columns of zeros, whose unknowns are zero, fill the last.
     ``alone``, N/m, shape (1,), is the inertia of a hub that no string pulls: it moves by this
@@ -73,16 +74,19 @@ class Border(NamedTuple):
     """
 
     columns: Array
-    rows: Array
+    hub: Array
+    moved: Array
     corner: Array
     alone: Array
     pivots: Indices
     used: Indices
 
     @classmethod
-    def empty(cls, unknowns: int, factors: int, hub: bool) -> "Border":
-        """With room for so many factors of the ropes, and for a hub."""
+    def empty(cls, unknowns: int, factors: int, points: int, hub: bool) -> "Border":
+        """With room for so many factors of ropes over so many points, and for a hub."""
         k = EIGHT * math.ceil((factors + 3 * hub) / EIGHT)
-        columns, rows = np.zeros((2, unknowns * k))
-        whole = np.zeros(k, dtype=np.int64), np.zeros(2, dtype=np.int64)
-        return cls(columns, rows, np.zeros(k * k), np.full(1, np.nan), *whole)
+        columns, rows, moved = unknowns * k, 3 * unknowns * hub, 3 * points * k
+        return cls(
+            np.zeros(columns), np.zeros(rows), np.zeros(moved), np.zeros(k * k), np.full(1, np.nan),
+            np.zeros(k, dtype=np.int64), np.zeros(3, dtype=np.int64),
+        )  # fmt: skip

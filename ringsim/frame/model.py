@@ -207,7 +207,7 @@ class FrameModel:
             self.others.append(self.hanging)
         self.reaction = np.zeros(len(mesh.fixed))
         self._begun = self.start.place.points.copy()
-        border = Border.empty(mesh.unknowns, 0, self.with_hub)
+        border = Border.empty(mesh.unknowns, 0, 0, self.with_hub)
         self.unroped = empty_of(Roped)._replace(border=border)
         self._fronts = Fronts.empty(mesh)
         self.begin_laws(self.laws)

@@ -220,6 +220,19 @@ _CLOSE = 1e-9
 """Points that coincide, over the size of the part: round-off leaves 1e-15."""
 
 
+_opened: "list[tuple[Scene, Array]]" = []
+"""The scene whose net was strung last, and its places: a run and its drive margin ask for the same,
+and layouts are most of what either builds."""
+
+
+def _deployed(scene: "Scene") -> Array:
+    """Places of all bodies of a scene where it is open, m, shape (bodies, 3)."""
+    if not _opened or _opened[0][0] is not scene:
+        layout = layout_at_opening(scene.model_copy(update={"net": None}), math.pi)
+        _opened[:] = [(scene, np.array([body.pose.place for body in layout.bodies]))]
+    return _opened[0][1]
+
+
 class BodyRef(NamedTuple):
     """A body of a draft."""
 
@@ -447,9 +460,7 @@ class Draft:
             return []
 
         def distances(pairs: NDArray[np.int64]) -> Array:
-            plain = self.scene.model_copy(update={"net": None})
-            deployed = layout_at_opening(plain, math.pi)
-            places = np.array([body.pose.place for body in deployed.bodies])
+            places = _deployed(self.scene)
             return np.asarray(np.linalg.norm(np.diff(places[pairs], axis=1)[:, 0], axis=1))
 
         rows = tuple(tuple(ref.number for ref in plane) for plane in self.corners)

@@ -137,13 +137,12 @@ class Configuration(NamedTuple):
     """The mechanism at a coordinate q (rad), which grows at 1 rad/s.
 
     ``values`` and ``slopes`` are the functions s of ``Points`` and their derivatives after q, shape
-    (functions,); ``matrix`` is the mass matrix of (V, W, q'), shape (7, 7).
+    (functions,).
     """
 
     place: float
     values: Array
     slopes: Array
-    matrix: Array
 
     def places(self, points: Array) -> Array:
         """Of points from their coefficients; (points, 3, functions) -> (points, 3), m."""
@@ -205,7 +204,11 @@ class Mechanism:
 
     def at(self, q: float) -> Configuration:
         """The mechanism at a coordinate (rad)."""
-        values, slopes = self.points.functions(q)
+        return Configuration(q, *self.points.functions(q))
+
+    def masses(self, now: Configuration) -> Array:
+        """The mass matrix of (V, W, q'), shape (7, 7)."""
+        values, slopes = now.values, now.slopes
         centre, moving = self._first @ values, self._first @ slopes
         by_place = np.tensordot(values, self._second, 1)
         about, turned = np.tensordot(values, by_place, 1), np.tensordot(slopes, by_place, 1)
@@ -218,7 +221,7 @@ class Mechanism:
         matrix[3:6, :3] = matrix[:3, 3:6].T
         matrix[6, :6] = matrix[:6, 6]
         matrix[6, 6] = np.trace(np.tensordot(slopes, np.tensordot(slopes, self._second, 1), 1))
-        return Configuration(q, values, slopes, matrix)
+        return matrix
 
     def pairs(self, now: Configuration, group: str | None = None) -> NetForce:
         """What laws between bodies do at rest, all or those of a group."""
@@ -251,15 +254,18 @@ class Mechanism:
 
     def rates(self, now: Configuration) -> Array:
         """(V, W, q') at q' = 1 that hold the held body; else those without momentum, shape (7,)."""
-        if self.fixed:
-            return np.append(self._holding(now), 1.0)
-        found = np.linalg.solve(now.matrix[:6, :6], -now.matrix[:6, 6])
-        return np.append(found, 1.0)
+        return self._rates(now, None if self.fixed else self.masses(now))
 
     def inertia(self, now: Configuration) -> float:
         """Twice the kinetic energy at q' = 1 rad/s, kg m^2."""
-        rates = self.rates(now)
-        return float(rates @ now.matrix @ rates)
+        masses = self.masses(now)
+        rates = self._rates(now, masses)
+        return float(rates @ masses @ rates)
+
+    def _rates(self, now: Configuration, masses: Array | None) -> Array:
+        if self.fixed or masses is None:
+            return np.append(self._holding(now), 1.0)
+        return np.append(np.linalg.solve(masses[:6, :6], -masses[:6, 6]), 1.0)
 
     def _holding(self, now: Configuration) -> Array:
         """(V, W) that stop the held body while the mechanism folds, shape (6,)."""

@@ -466,3 +466,11 @@ def test_values_that_nobody_means_are_told_and_not_refused(doubtful: list[tuple[
     for _, words in doubtful:
         assert sum(words in line for line in lines) == 1, lines
     assert told.splitlines()[-1].startswith("valid")
+
+
+def test_a_run_tells_them_too(tmp_path: Path) -> None:
+    """It runs all the same."""
+    settings = ["--set", "structure.corner_mass=30", "--out", str(tmp_path / "run.nc")]
+    told = ringsim("run", "truss2", "--fidelity", "frame", *settings).splitlines()
+    assert told[0] == "doubtful: structure.corner_mass: corners of 180 kg on rods of 0.143 kg"
+    assert told[1].startswith("truss2: ok, deployed")

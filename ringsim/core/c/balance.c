@@ -108,10 +108,10 @@ static bool pull_pairs(const Web *web, const Mesh *mesh, const Held *held, const
 }
 
 /* Add derivatives of the pulls to the fronts and, if the hub is strung, those after its place to the
-   first three columns, rows and corner of the border, of so many columns. */
+   first three columns, of so many, and to rows and corner of the border. */
 static void add_pairs(const Web *web, const Mesh *mesh, const Held *held, const Followed *now,
-                      D by_rate, bool strung, const Fronts *fronts, D *columns, D *rows, D *corner,
-                      I wide) {
+                      D by_rate, bool strung, const Fronts *fronts, const Border *border, I wide) {
+    D *columns = border->columns.at, *rows = border->hub.at, *corner = border->corner.at;
     MEASURED(web, held, now);
     D slope[pairs + 1];
     memset(slope, 0, sizeof slope);
@@ -135,7 +135,7 @@ static void add_pairs(const Web *web, const Mesh *mesh, const Held *held, const 
                 front[(second + i) * fronts->columns + second + j] += block;
                 if (loose) {
                     columns[(home + i) * wide + j] -= block;
-                    rows[(home + i) * wide + j] -= block;
+                    rows[j * mesh->unknowns + home + i] -= block;
                     corner[i * wide + j] += block;
                 } else {
                     front[(first + i) * fronts->columns + first + j] += block;
@@ -259,8 +259,7 @@ bool balance(const Mesh *mesh, const PathPoints *paths, const Held *held, const 
    strains, and of rates and accelerations after places. */
 void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, const Web *web,
                    const Pose *pose, const Followed *now, const D *loads, D lead, D by_rate,
-                   D by_place, bool strung, const Fronts *fronts, D *columns, D *rows, D *corner,
-                   I wide) {
+                   D by_place, bool strung, const Fronts *fronts, const Border *border, I wide) {
     const I *cuts = held->cuts.at;
     I points = mesh->point_mass.n;
     D room[3 * points + 1];
@@ -273,7 +272,7 @@ void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, con
     }
     add_joint_slopes(joints, pose->angle.at, now->rate.at + cuts[ANGLES], by_rate, mesh, fronts);
     if (strung)
-        for (int i = 0; i < 3; i++) corner[i * wide + i] = web->hub_mass * by_place;
+        for (int i = 0; i < 3; i++) border->corner.at[i * (wide + 1)] = web->hub_mass * by_place;
     if (web->first.n > 0)
-        add_pairs(web, mesh, held, now, by_rate, strung, fronts, columns, rows, corner, wide);
+        add_pairs(web, mesh, held, now, by_rate, strung, fronts, border, wide);
 }

@@ -121,15 +121,15 @@ typedef struct {
 } Fronts;
 
 typedef struct {
-    Reals columns, rows, corner, alone;
+    Reals columns, hub, moved, corner, alone;
     Ints pivots, used;
 } Border;
 
 /* Length (m) below which a span is none. */
 static const D SHORTEST = 1e-9;
 
-/* Places of used: columns in use, and whether the first three are a hub's. */
-enum { WIDE_USED, STRUNG };
+/* Places of used: columns in use, whether the first three are a hub's, and factors of the ropes. */
+enum { WIDE_USED, STRUNG, FACTORS };
 
 /* ringsim.core.chain.Seen */
 typedef struct {
@@ -314,8 +314,7 @@ bool balance(const Mesh *mesh, const PathPoints *paths, const Held *held, const 
              const Strains *strains, D *loads, D *g, I size);
 void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, const Web *web,
                    const Pose *pose, const Followed *now, const D *loads, D lead, D by_rate,
-                   D by_place, bool strung, const Fronts *fronts, D *columns, D *rows, D *corner,
-                   I wide);
+                   D by_place, bool strung, const Fronts *fronts, const Border *border, I wide);
 D measure(const RopeTable *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
           I n_rates, const Spans *spans);
 Place place_behind(const RopeTable *ropes, I rope, Place before);
@@ -326,13 +325,15 @@ I turn_winches(const Answering *own, const RopeTable *ropes, Ask ask);
 I find_left(const Answering *own, const RopeTable *ropes, Ask ask, D *left, I n);
 D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g);
 I find_slopes(const Roped *roped, const PulleyLaws *laws);
+void move_paths(const PathPoints *paths, const Mesh *mesh, const Arms *arms, const D *x, I n, D *out);
 void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,
                 I wide, I first);
 void move(const Mesh *mesh, const Pose *pose, const D *step, I n_step);
 bool factor(const Mesh *mesh, const Fronts *fronts);
 void solve(const Mesh *mesh, const Fronts *fronts, D *x, I n_x);
 void solve_one(const Mesh *mesh, const Fronts *fronts, D *x, I n_x);
-bool close_border(const Mesh *mesh, const Fronts *fronts, const Border *border, I n);
-void cross_border(const Border *border, I unknowns, I n, bool strung, D *x);
+void take_rows(const D *rows, I count, I size, const D *columns, I n, D *corner);
+bool close_border(const System *system, const Roped *roped);
+void cross_border(const System *system, const Roped *roped, D *x);
 
 #endif

@@ -134,10 +134,14 @@ static void solve_eight(const Mesh *mesh, const Fronts *fronts, D *x, I apart) {
             D *own = x + mesh->fixed.at[f] * apart;
             put(own, all(0.0)), put(own + LANES, all(0.0));
         }
+        Mask pulled = {0};
         for (I k = 0; k < gone; k++) {
             const D *own = x + spots[begin + k] * apart;
             known[k][0] = take(own), known[k][1] = take(own + LANES);
+            pulled |= (known[k][0] != 0.0) | (known[k][1] != 0.0);
         }
+        /* A pulley pulls on spans behind it alone. */
+        if (!any(pulled)) continue;
         /* Two rows at once: a sum waits for the one before.  An odd last row is its own twin. */
         for (I i = begin + gone; i < size; i += 2) {
             I twin = i + 1 < size ? i + 1 : i;
@@ -229,17 +233,44 @@ void solve_one(const Mesh *mesh, const Fronts *fronts, D *x, I n_x) {
     }
 }
 
-/* The border: factor its own block D - R^T K^-1 C, whose n columns are eights, with exchange of rows;
-   its columns C become K^-1 C.  False if it is singular. */
-bool close_border(const Mesh *mesh, const Fronts *fronts, const Border *border, I n) {
-    D *a = border->corner.at;
-    solve(mesh, fronts, border->columns.at, mesh->unknowns * n);
-    for (I u = 0; u < mesh->unknowns; u++) {
-        const D *column = border->columns.at + u * n, *row = border->rows.at + u * n;
-        for (I i = 0; i < n; i++)
-            if (row[i] != 0.0) /* most are none */
-                for (I j = 0; j < n; j += LANES)
-                    put(a + i * n + j, take(a + i * n + j) - row[i] * take(column + j));
+/* Take rows, shape (count, size), times columns, (size, n) with n eights, off a corner, (count, n). */
+void take_rows(const D *rows, I count, I size, const D *columns, I n, D *corner) {
+    for (I j = 0; j < n; j += EIGHT)
+        /* Two rows at once: a sum waits for the one before.  An odd last row is its own twin. */
+        for (I i = 0; i < count; i += 2) {
+            I twin = i + 1 < count ? i + 1 : i, first = 0, last = size;
+            const D *one = rows + i * size, *other = rows + twin * size;
+            D *of_one = corner + i * n + j, *of_other = corner + twin * n + j;
+            V p0 = take(of_one), p1 = take(of_one + LANES), q0 = take(of_other), q1 = take(of_other + LANES);
+            /* A rope's rows have nothing of the others. */
+            while (first < last && one[first] == 0.0 && other[first] == 0.0) first++;
+            while (first < last && one[last - 1] == 0.0 && other[last - 1] == 0.0) last--;
+            for (I k = first; k < last; k++) {
+                V low = take(columns + k * n + j), high = take(columns + k * n + j + LANES);
+                p0 -= one[k] * low, p1 -= one[k] * high;
+                q0 -= other[k] * low, q1 -= other[k] * high;
+            }
+            put(of_one, p0), put(of_one + LANES, p1);
+            if (twin > i) put(of_other, q0), put(of_other + LANES, q1);
+        }
+}
+
+/* Factor the border's own block D - R^T K^-1 C, whose columns are eights, with exchange of rows; its
+   columns C become K^-1 C.  False if it is singular.
+
+   Rows of ropes are what their tensions change with, after the places of the points, behind how
+   these move with the unknowns. */
+bool close_border(const System *system, const Roped *roped) {
+    const Mesh *mesh = &system->mesh;
+    const Border *border = &roped->border;
+    I n = border->used.at[WIDE_USED], strung = border->used.at[STRUNG], factors = border->used.at[FACTORS];
+    D *a = border->corner.at, *columns = border->columns.at;
+    solve(mesh, &system->fronts, columns, mesh->unknowns * n);
+    if (strung) take_rows(border->hub.at, 3, mesh->unknowns, columns, n, a);
+    if (factors > 0) {
+        I size = 3 * system->paths.frame.n;
+        move_paths(&system->paths, mesh, &system->arms, columns, n, border->moved.at);
+        take_rows(roped->factors.at + factors * size, factors, size, border->moved.at, n, a + 3 * strung * n);
     }
     for (I k = 0; k < n; k++) {
         I best = k;
@@ -262,13 +293,17 @@ bool close_border(const Mesh *mesh, const Fronts *fronts, const Border *border, 
 
 /* A solution x of the fronts alone becomes that of all; behind the fronts' unknowns come, if it is
    strung, those of a hub. */
-void cross_border(const Border *border, I unknowns, I n, bool strung, D *x) {
-    const D *a = border->corner.at;
-    D z[n];
+void cross_border(const System *system, const Roped *roped, D *x) {
+    const Border *border = &roped->border;
+    I unknowns = system->mesh.unknowns, size = 3 * system->paths.frame.n;
+    I n = border->used.at[WIDE_USED], strung = border->used.at[STRUNG], factors = border->used.at[FACTORS];
+    const D *a = border->corner.at, *changes = roped->factors.at + factors * size;
+    D z[n], *moved = border->moved.at;
     memset(z, 0, sizeof z);
-    for (I u = 0; u < unknowns; u++)
-        for (I j = 0; j < n; j += LANES) put(z + j, take(z + j) - x[u] * take(border->rows.at + u * n + j));
-    for (I k = 0; strung && k < 3; k++) z[k] += x[unknowns + k];
+    for (I k = 0; k < 3 * strung; k++)
+        z[k] = x[unknowns + k] - product(border->hub.at + k * unknowns, x, unknowns);
+    if (factors > 0) move_paths(&system->paths, &system->mesh, &system->arms, x, 1, moved);
+    for (I k = 0; k < factors; k++) z[3 * strung + k] = -product(changes + k * size, moved, size);
     for (I k = 0; k < n; k++) {
         I best = border->pivots.at[k];
         D own = z[best];
@@ -281,7 +316,7 @@ void cross_border(const Border *border, I unknowns, I n, bool strung, D *x) {
         for (I i = 0; i < k; i++) z[i] -= a[i * n + k] * z[k];
     }
     for (I u = 0; u < unknowns; u++) x[u] -= product(border->columns.at + u * n, z, n);
-    for (I k = 0; strung && k < 3; k++) x[unknowns + k] = z[k];
+    for (I k = 0; k < 3 * strung; k++) x[unknowns + k] = z[k];
 }
 
 /* What ringsim.frame.elimination counts with, too. */

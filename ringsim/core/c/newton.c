@@ -101,22 +101,22 @@ I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, con
         factors = find_slopes(roped, &system->laws);
     }
     I wide = (factors + 3 * strung + 7) / 8 * 8;
-    border->used.at[WIDE_USED] = wide;
+    border->used.at[WIDE_USED] = wide, border->used.at[FACTORS] = factors;
     border->alone.at[0] = system->hub && !strung ? system->web.hub_mass * by_place : NAN;
     memset(border->columns.at, 0, (size_t)(mesh->unknowns * wide) * sizeof(D));
-    memset(border->rows.at, 0, (size_t)(mesh->unknowns * wide) * sizeof(D));
+    if (strung) memset(border->hub.at, 0, (size_t)(3 * mesh->unknowns) * sizeof(D));
     memset(border->corner.at, 0, (size_t)(wide * wide) * sizeof(D));
     for (I k = 0; k < wide; k++) border->corner.at[k * (wide + 1)] = -1.0;
     differentiate(mesh, &system->held, &system->joints, &system->web, &now->pose, &now->followed,
                   system->kept.at, now->strains.lead.at[0], by_rate, by_place, strung, &system->fronts,
-                  border->columns.at, border->rows.at, border->corner.at, wide);
+                  border, wide);
     add_dry_slopes(&system->joints, &system->rubbing, now->pose.angle.at, rates + cuts[ANGLES],
                    by_rate, mesh, &system->fronts);
     if (asks & PARTS && ask(SLOPES)) return RAISED;
     if (roped->ropes.starts.n > 0)
         add_cables(system, roped, rates + cuts[PATHS], by_rate, factors, wide, 3 * strung);
     if (!factor(mesh, &system->fronts)) return PIVOT;
-    return wide == 0 || close_border(mesh, &system->fronts, border, wide) ? BALANCED : PIVOT;
+    return wide == 0 || close_border(system, roped) ? BALANCED : PIVOT;
 }
 
 /* Replace what is out of balance by the change of all unknowns, the hub's last, that takes it to
@@ -126,8 +126,7 @@ void relax(const System *system, const Roped *roped, D *x, I size) {
     I unknowns = system->mesh.unknowns;
     for (I k = 0; k < size; k++) x[k] = -x[k];
     solve_one(&system->mesh, &system->fronts, x, unknowns);
-    if (border->used.at[WIDE_USED] > 0)
-        cross_border(border, unknowns, border->used.at[WIDE_USED], border->used.at[STRUNG], x);
+    if (border->used.at[WIDE_USED] > 0) cross_border(system, roped, x);
     if (!isnan(border->alone.at[0]))
         for (I k = unknowns; k < size; k++) x[k] /= border->alone.at[0];
 }

@@ -560,8 +560,9 @@ void spread_changes(const RopeTable *ropes, const Spans *spans, const D *pulls, 
     for (I row = 0; row < count; row++)
         for (I i = 0; i < n; i++) {
             D *pull = out + 3 * (row * points + ropes->near.at[i]), *change = pull + half;
-            Vec own = times(pulls[row * n + i], vector(spans->unit.at + 3 * i));
-            Vec with = vector(changes + 3 * (row * n + i));
+            D share = pulls[row * n + i];
+            Vec own = times(share, vector(spans->unit.at + 3 * i)), with = vector(changes + 3 * (row * n + i));
+            if (share == 0.0 && with.x == 0.0 && with.y == 0.0 && with.z == 0.0) continue; /* another rope */
             add_vector(pull, times(-1.0, own));
             add_vector(pull + 3, own);
             add_vector(change, times(-1.0, with));
@@ -569,9 +570,31 @@ void spread_changes(const RopeTable *ropes, const Spans *spans, const D *pulls, 
         }
 }
 
-/* Add how spans turn to the fronts, and how tensions change to the border's columns and rows, shape
-   (unknowns, wide), from the first on, in so many factors.  rates are those of the points (m/s),
-   rate_by_place the derivative of rates after places (1/s). */
+/* How all points move with so many changes of the unknowns, shape (unknowns, n): (points, 3, n). */
+void move_paths(const PathPoints *paths, const Mesh *mesh, const Arms *arms, const D *x, I n, D *out) {
+    for (I p = 0; p < paths->frame.n; p++) {
+        const D *own = x + mesh->home.at[paths->frame.at[p]] * n, *turn = own + 3 * n;
+        D *to = out + 3 * p * n;
+        Vec arm = vector(arms->whole.at + 3 * p);
+        for (I c = 0; c < n; c++) {
+            D a = turn[c], b = turn[n + c], d = turn[2 * n + c];
+            to[c] = own[c] + (b * arm.z - d * arm.y);
+            to[n + c] = own[n + c] + (d * arm.x - a * arm.z);
+            to[2 * n + c] = own[2 * n + c] + (a * arm.y - b * arm.x);
+        }
+        if (paths->angle.at[p] < 0) continue;
+        Vec swing = cross(vector(arms->axis.at + 3 * p), vector(arms->swung.at + 3 * p));
+        const D *angle = x + mesh->angle_home.at[paths->angle.at[p]] * n;
+        for (I c = 0; c < n; c++) {
+            to[c] += swing.x * angle[c], to[n + c] += swing.y * angle[c];
+            to[2 * n + c] += swing.z * angle[c];
+        }
+    }
+}
+
+/* Add how spans turn to the fronts, and how tensions change to the border's columns, shape (unknowns,
+   wide), from the first on, in so many factors; what they change with stays in the factors.  rates
+   are those of the points (m/s), rate_by_place the derivative of rates after places (1/s). */
 void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,
                 I wide, I first) {
     const Mesh *mesh = &system->mesh;
@@ -592,5 +615,4 @@ void add_cables(const System *system, const Roped *roped, const D *rates, D rate
     spread_changes(ropes, spans, pulls, count * n, changes, 0, factors, 2 * all_points);
     add_span_tangent(paths, arms, spans, &system->fronts);
     pull_paths(paths, mesh, arms, factors, count, roped->border.columns.at, wide, first);
-    pull_paths(paths, mesh, arms, factors + all_points, count, roped->border.rows.at, wide, first);
 }
