@@ -111,7 +111,7 @@ def ending_lines(
             why = f"sample {own[0]}: {why}"
         told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
         told = "" if word in REACHED else told
-        if opened is not None and word == Fate.OVERLOADED.words:
+        if opened is not None and word == Fate.OVERLOADED.words and opened[own].any():
             told = f", {int(opened[own].sum())} of them with all V-joints locked{told}"
         if word != UNKNOWN:
             lines.append(f"{word.removeprefix(LOST)}: {len(own)} of {run}{told}")

@@ -224,7 +224,13 @@ def influence(
             found |= _told(f"{name}_{word}rank_correlation", middle, ends, words, ("input",))
     groups = groups_of(campaign, requirements)
     if groups:
-        pairs = [_separated(inputs, own, of, index, placed) for own, of in groups.values()]
+        each = groups.values()
+        pairs = [_separated(inputs, own, of, index, placed) for own, of in each]
+        found["separation_chance"] = (
+            ("group", "input"),
+            np.array([indices.area_chances(inputs.values[of], own[of]) for own, of in each]),
+            about("probability of such a separation if the group was drawn by lot"),
+        )
         middle, ends = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
         words = (
             "probability that the input is larger in a sample of the group than in another sample"
@@ -294,22 +300,20 @@ def strongest(names: Sequence[str], places: Mapping[str, tuple[str, int, int]]) 
     return kept
 
 
-def separating(analysis: xr.Dataset, samples: int) -> Iterator[tuple[str, list[int]]]:
-    """The groups of ``influence``, from so many samples, with the inputs that separate each beyond
-    chance, the best first; of inputs that share places only the best.
+def separating(analysis: xr.Dataset) -> Iterator[tuple[str, list[int]]]:
+    """The groups of ``influence`` with the inputs that separate each beyond chance, the best first;
+    of inputs that share places only the best.
     """
     if "group" not in analysis.dims:
         return
-    normal = -float(scipy.special.ndtri(chance_of_each(analysis.sizes["input"]) / 2))
+    level = chance_of_each(analysis.sizes["input"])
     places, names = places_in(analysis), analysis["input"].values.astype(str)
     for group in analysis["group"].values:
         one = analysis.sel(group=group)
         middle, ends = one["separation"].values - 0.5, one["separation_interval"].values - 0.5
-        own = one["group_samples"].item()
-        # Variance of the area under the curve without a difference: Mann and Whitney (1947).
-        chance = normal * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
         order = np.argsort(-np.abs(np.nan_to_num(middle)), kind="stable")
-        order = order[beyond(middle, ends, chance)[order]]
+        rare = one["separation_chance"].values < level
+        order = order[(rare & beyond(middle, ends, 0.0))[order]]
         kept = strongest(names[order].tolist(), places)
         yield str(group), [int(k) for k in order if names[k] in kept]
 

@@ -550,7 +550,7 @@ def what_separates(analysis: xr.Dataset) -> Table:
     if "group" not in analysis.dims:
         return Table((), ())
     rows, names, within = [], analysis["input"].values.tolist(), places_in(analysis)
-    for group, chosen in separating(analysis, analysis.attrs["samples_run"]):
+    for group, chosen in separating(analysis):
         one = analysis.sel(group=group)
         middle, ends = one["separation"].values, one["separation_interval"].values
         first = group.split("; ")[0]
@@ -567,5 +567,4 @@ def what_separates(analysis: xr.Dataset) -> Table:
 
 def _separated_groups(analysis: xr.Dataset) -> set[str]:
     """The groups that some input separates, each by all of its names."""
-    found = separating(analysis, analysis.attrs["samples_run"])
-    return {group for group, chosen in found if chosen}
+    return {group for group, chosen in separating(analysis) if chosen}

@@ -106,6 +106,9 @@ def judge(
             latches = np.maximum(uncertain_latches(campaign), slow_latches(campaign))  # mostly both
             if name == LATCHED:  # so many more or fewer may have caught
                 latches = latches - np.abs(wanted.beyond(numbers(campaign, name)))
+            else:  # no latch opens a ring that stalled before its stops
+                ends = campaign[OUTCOME].to_numpy()
+                latches = latches * np.isin(ends, [Fate.DEPLOYED, Fate.NOT_LATCHED])
             off = off | (latches > 0.0)
         for key, value in _judged(campaign, name, wanted, placed, rule, off).items():
             columns[key].append(value)
@@ -127,9 +130,9 @@ def _together(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement,
     rule: Rule | None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Samples that keep to all of several requirements, of those that have run, and the lower bound
-    of their probability with the largest confidence of them all, at all looks of a rule at once as
-    their own bounds; failed runs keep to none.
+    """Samples that keep to all of several requirements, of those that have run, and the bounds of
+    their probability, each with the largest confidence of them all, at all looks of a rule at once
+    as their own bounds; failed runs keep to none.
     """
     run = good(campaign) | lost(campaign)
     if len(requirements) < 2 or not run.any():
@@ -137,22 +140,25 @@ def _together(
     kept = good(campaign).copy()
     for name, wanted in requirements.items():
         kept &= ~violations(campaign, name, wanted)
-    sure, least = max(each.confidence for each in requirements.values()), np.nan
+    sure, ends = max(each.confidence for each in requirements.values()), (np.nan, np.nan)
     looked = int(run.sum())
     level = sure if rule is None else max(
         rule.levels(name, wanted, looked, placed.replicates)[0]
         for name, wanted in requirements.items()
     )  # fmt: skip
     if placed.population:
-        least = bounds(kept[run], campaign["sample"].to_numpy()[run], (level, level), placed)[0]
+        ends = bounds(kept[run], campaign["sample"].to_numpy()[run], (level, level), placed)
     return {
         "together_samples": ((), int(kept.sum()), about("samples that keep to all requirements")),
         "together_lost": ((), int(lost(campaign).sum()), about("of these, failed runs")),
         "together_of": ((), int(run.sum()), about("samples that have run, failed ones too")),
-        "together_probability_lower": (
-            (), least, about("lower bound of the probability to keep to all requirements"),
-        ),
-        "together_confidence": ((), sure, about("confidence of that bound")),
+        **{
+            f"together_probability_{word}": (
+                (), end, about(f"{word} bound of the probability to keep to all requirements"),
+            )
+            for word, end in zip(("lower", "upper"), ends, strict=True)
+        },
+        "together_confidence": ((), sure, about("confidence of each bound")),
     }  # fmt: skip
 
 
@@ -341,14 +347,18 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
 
 def _together_told(analysis: xr.Dataset, count: int) -> str:
     """How many samples keep to all requirements."""
-    names = ("samples", "of", "probability_lower", "confidence")
-    kept, run, least, sure = (float(analysis[f"together_{name}"]) for name in names)
+    names = ("samples", "of", "probability_lower", "probability_upper", "confidence")
+    kept, run, least, most, sure = (float(analysis[f"together_{name}"]) for name in names)
     told = f"all {count} requirements together: {kept:.0f} of {run:.0f} samples meet them"
     if failed := int(analysis["together_lost"]):
         told += f" ({counted(failed, 'failed run')} counted as not meeting them)"
     if np.isfinite(least):
-        bound = bound_text(least, upper=False)
-        told += f", a probability of at least {bound} (confidence {sure:g})"
+        # Of few that meet them all the upper bound says more, and of none the lower one nothing.
+        upper = 2.0 * kept < run
+        bound = bound_text(most if upper else least, upper=upper)
+        told += (
+            f", a probability of at {'most' if upper else 'least'} {bound} (confidence {sure:g})"
+        )
     return told
 
 

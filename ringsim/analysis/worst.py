@@ -202,7 +202,7 @@ def _told(name: str, rows: Array, value: float, units: str) -> str:
         colder = float(np.mean(rows < value))
         sense, share = ("warmer", colder) if value > middle else ("colder", np.mean(rows > value))
         than = f", {sense} than {100.0 * share:.0f} %" * (not end)
-        return f"{name} {value:.4g} K ({value - _ZERO:+.0f} C{than}{end})"
+        return f"{name} {value:.4g} K ({value - _ZERO:.0f} C{than}{end})"
     if rows.min() > 0.0 or rows.max() < 0.0:
         ratio = value / middle
         far = f"{100.0 * (ratio - 1.0):+.0f} %" if ratio < 3.0 else f"{ratio:.2g} times the median"
@@ -251,7 +251,7 @@ def worst(
     # What has not run yet is no sample of which others are told.
     campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
     rows, chosen = list[tuple[str, int, int, str]](), list[int]()
-    sides, every = list[dict[str, bool]](), _sides(analysis, campaign.sizes["sample"])
+    sides, every = list[dict[str, bool]](), _sides(analysis)
     wider = list[tuple[Mask, dict[str, bool]]]()
     for each in _failures(campaign, requirements):
         own = np.flatnonzero(each.own)
@@ -285,12 +285,12 @@ def worst(
     return xr.Dataset({f"worst_{name}": ("worst", *each) for name, each in columns.items()})
 
 
-def _sides(analysis: xr.Dataset | None, samples: int) -> dict[str, dict[str, bool]]:
+def _sides(analysis: xr.Dataset | None) -> dict[str, dict[str, bool]]:
     """Of each failure by its words the inputs that separate it, and whether they are larger."""
     found: dict[str, dict[str, bool]] = {}
     if analysis is None:
         return found
-    for group, chosen in separating(analysis, samples):
+    for group, chosen in separating(analysis):
         one = analysis.sel(group=group)["separation"][chosen]
         larger = dict(zip(one["input"].values.tolist(), (one.values > 0.5).tolist(), strict=True))
         found |= dict.fromkeys(group.split("; "), larger)

@@ -406,14 +406,14 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
     for number, plane in enumerate(scene.structure.planes):
         own = [w for (cable, _), w in winches.items() if cable == number and turns_ever(w)]
         if own and all(winch.start_time > both.conditions.begin for winch in own):
-            yield f"{plane} cable alone: its winch starts later, not included here"
+            yield f"{plane} plane alone: its winch starts later, not included here"
             continue
         least = PlaneMargin(both, number).least()
         whole = both.at(least.angle).available
         share = f"{100.0 * least.available / whole:.3g}" if whole > 0.0 else "0"
         yield (
-            f"{plane} cable alone: gives {share} % of the drive and must overcome half of what "
-            f"resists: {_verdict(least)}"
+            f"{plane} plane alone: its cable, with half of springs and loads, gives {share} % of "
+            f"what drives, against half of what resists: {_verdict(least)}"
         )
 
 

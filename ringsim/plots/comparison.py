@@ -240,7 +240,7 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
     grid[0].set_xlim(0.0, 1.0 if apart else ends[0])
     if apart:
         first, second = map("{} s in {}".format, (number_text(e, 3) for e in ends), names_of(found))
-        grid[-1].set_xlabel(f"Share of {first} and of {second}")
+        grid[-1].set_xlabel(f"Share of {first} and of {second}, when the last ring had opened")
         grid[-1].xaxis.set_major_formatter(PercentFormatter(1.0))
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
@@ -311,8 +311,11 @@ def _until(both: Both) -> tuple[list[float], bool]:
         min(_last(each), shown_until(each)[0]) if "sample" in each.dims else _last(each)
         for each in both
     ]
-    apart = max(ends) > _APART * min(ends) > 0.0
-    return ends if apart else [max(ends)] * 2, apart
+    if not max(ends) > _APART * min(ends) > 0.0:
+        return [max(ends)] * 2, False
+    # Rings that do not open run on for long: the others' courses would lie beside each other.
+    opened = [np.append(each.get("deployment_time", np.nan), 0.0) for each in both]
+    return [float(np.nanmax(o)) or end for o, end in zip(opened, ends, strict=True)], True
 
 
 def _last(dataset: xr.Dataset) -> float:

@@ -315,7 +315,7 @@ def _rows(axes: Axes, labels: list[str], places: Any, told: list[list[str]]) -> 
                     (places[j, k], k),
                     textcoords="offset points",
                     ha="center",
-                    xytext=(0, -13 if j else 6),
+                    xytext=(0, (6, -13, -22)[j]),
                     fontsize=8,
                     bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
                 )

@@ -44,7 +44,7 @@ from ringsim.report.player import player
 from ringsim.report.shell import filling, written
 from ringsim.sampling.distributions import law_text
 from ringsim.scene import builtin_scenes
-from ringsim.tables import number_text, unit_text
+from ringsim.tables import Table, number_text, unit_text
 from ringsim.variables import Cause
 
 # What a page tells of the campaign beside its analysis: plain rows of text.
@@ -64,18 +64,14 @@ _LONGEST = 400
 Rows = list[list[str]]
 
 
-def failures(
-    campaign: xr.Dataset, folder: str, told: Mapping[int, Sequence[str]] | None = None
-) -> tuple[Rows, int]:  # fmt: skip
+def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
     """Samples, ending with its cause, reason, command that repeats the first; how many rows are
     left out.
 
     Runs that lost their numbers, and sound ones in which the antenna fell short of its goal; a row
     for all that ended in the same way.  Antennas end in the same way that differ by places and
-    numbers: the row has the words of the first.  No row of samples without a cause of which all it
-    is ``told`` by sample why they ended.
+    numbers: the row has the words of the first.
     """
-    told = {} if told is None else told
     words, goals = endings(campaign), (*REACHED, UNKNOWN, NOT_RUN)
     causes = {int(cause): cause.words for cause in Cause if cause}
     codes = campaign["cause"].values.tolist()
@@ -91,18 +87,27 @@ def failures(
             said.setdefault(shape, set()).add(how[2])
             alike.setdefault(shape, []).append(sample)
     rows = []
-    why = dict(zip(campaign["sample"].values.tolist(), map(first_clause, reasons), strict=True))
     for shape, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith(LOST)):
         mark = "" if len(said[shape]) == 1 else f"sample {samples[0]}: "
         ending, cause, _ = shape
-        if not cause and all(why[k] in told.get(k, ()) for k in samples):
-            continue
         how_told = ending + f" ({cause})" * bool(cause), mark + first[shape]
         named = "sample " if len(samples) == 1 else "samples "
         named += ", ".join(map(str, samples[:_MOST_NAMED]))
         named += f" and {len(samples) - _MOST_NAMED} more" * (len(samples) > _MOST_NAMED)
         rows.append([named, *how_told, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])
     return rows[:MOST_FAILURES], max(0, len(rows) - MOST_FAILURES)
+
+
+def _all_told(campaign: xr.Dataset, short: list[int], tables: Sequence[Table]) -> bool:
+    """Whether tables of worst samples say of all samples that ended short why they did: a table of
+    the rest would look like one of all.
+    """
+    said = {
+        (int(row[0]), row[1].removeprefix("no value: ")) for each in tables for row in each.rows
+    }
+    reasons = campaign["reason"].sel(sample=short).values.tolist()
+    whys = [first_clause(without_doubts(str(each))) for each in reasons]
+    return all(each in said for each in zip(short, whys, strict=True))
 
 
 def drawn_inputs(campaign: xr.Dataset) -> Rows:
@@ -270,12 +275,10 @@ def page(
     """
     analysis = analyse(campaign) if analysis is None else analysis
     wanted = campaign_file(campaign)
-    found = dict[int, list[str]]()
-    for table in worst_tables(analysis, folder):
-        for sample, what, *_ in table.rows:
-            found.setdefault(int(sample), []).append(what.removeprefix("no value: "))
-    fell_short, more = failures(campaign, folder, found)
-    short = ~np.isin(endings(campaign), (*REACHED, UNKNOWN, NOT_RUN))
+    fell_short, more = failures(campaign, folder)
+    short = campaign["sample"].values[~np.isin(endings(campaign), (*REACHED, UNKNOWN, NOT_RUN))]
+    if _all_told(campaign, short.tolist(), worst_tables(analysis, folder)):
+        fell_short = []
     apart = [] if measurement is None else residuals(campaign, measurement)  # refuses others' tests
     shown = player(campaign, analysis, measurement)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
@@ -298,8 +301,7 @@ def page(
                   if name in campaign},
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign),
-        "player": shown, "failures": fell_short, "more": more,
-        "short": bool(short.any()),
+        "player": shown, "failures": fell_short, "more": more, "short": bool(short.size),
         "worst_note": note_on_unusual(analysis),
         "players": {str(sample): k for sample, k in places.items()},
         "notes": [*restart_lines(campaign), *override_lines(campaign)],

@@ -24,7 +24,7 @@ from ringsim.analysis.study_text import told as all_told
 from ringsim.analysis.verdicts import verdict_table
 from ringsim.analysis.worst import margin_table
 from ringsim.plots.figures import figures_of
-from ringsim.variables import Status
+from ringsim.variables import Fate, Status
 
 pytestmark = pytest.mark.quick
 
@@ -210,6 +210,11 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
         told = f"met, if its numbers hold: may be off in {count} of 30 samples"
         assert table.rows[0][1] == ("met" if stands else told)
         assert any("uncertain whether all latches catch" in n for n in table.notes) != stands
+    # No latch of a ring that stalled before its stops is in doubt.
+    made["outcome"].values[:3] = Fate.STALLED
+    (note,) = [n for n in verdict_table(analyse(made, wanted)).notes if "uncertain whether" in n]
+    assert note.startswith("outcome: in 27 samples it is uncertain")
+    made["outcome"].values[:3] = Fate.DEPLOYED
     # A rate of 0.30 rad/s, known to 0.06, may have been below the 0.25 at which latches catch.
     made["reason"] = "sample", np.array([REACHED] * 30)
     rates = np.full((30, 2, 4), 0.40)

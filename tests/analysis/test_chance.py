@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
 import numpy as np
 import pytest
+import scipy.stats
 
 from made import drawn_campaign
 from ringsim.analysis import indices
 from ringsim.analysis.influence_text import what_matters, what_separates
 from ringsim.analysis.study import analyse
+from ringsim.analysis.worst import worst_tables
 from ringsim.sampling.designs.independent import RandomDesign, Sobol
 
 NOISE = 400
@@ -40,7 +45,7 @@ def test_shuffles_of_all_columns_at_once_are_those_one_by_one():
 
 
 @pytest.mark.parametrize("measure", [indices.correlations, indices.partial_correlations])
-@pytest.mark.parametrize("samples", [12, 60])
+@pytest.mark.parametrize("samples", [12, 90])
 def test_the_largest_rank_correlation_by_chance(measure, samples):
     random, among = np.random.default_rng(7), 30 if samples > 40 else 4
     held = among - 1 if measure is indices.partial_correlations else 0
@@ -108,3 +113,80 @@ def test_of_many_samples_the_distribution_tells_what_shuffles_do(
     shuffled = indices.chance_levels(columns, output[None])[0]
     assert quick != shuffled
     assert quick == pytest.approx(shuffled, rel=0.1)
+
+
+def _group(samples: int, inside: int) -> np.ndarray:
+    group = np.zeros(samples, dtype=bool)
+    group[np.random.default_rng(samples).choice(samples, inside, replace=False)] = True
+    return group
+
+
+@pytest.mark.parametrize("inside", [2, 4, 9])
+def test_the_chance_of_a_separation_is_that_of_all_groups(inside: int) -> None:
+    """Of columns with ties, with two values and with none; also of most of the samples."""
+    random, samples = np.random.default_rng(inside), 12
+    kinds = [random.random(samples), random.integers(0, 4, samples), random.random(samples) > 0.6]
+    columns, group = np.stack(kinds, axis=1).astype(float), _group(samples, inside)
+    ranks = indices.centred_ranks(columns)
+    groups = itertools.combinations(range(samples), inside)
+    sums = np.abs([ranks[list(each)].sum(axis=0) for each in groups])
+    truth = (sums >= np.abs(ranks[group].sum(axis=0)) - 1e-9).mean(axis=0)
+    assert indices.area_chances(columns, group) == pytest.approx(truth)
+
+
+@pytest.mark.parametrize(("samples", "inside"), [(60, 15), (1000, 4), (1000, 15), (300, 40)])
+def test_the_chance_of_a_separation_of_many_samples(samples: int, inside: int) -> None:
+    """scipy counts all groups of columns without ties."""
+    group = _group(samples, inside)
+    for shift in (0.0, 0.1, 0.3):
+        column = np.random.default_rng(5).random(samples) + shift * group
+        truth = scipy.stats.mannwhitneyu(column[group], column[~group], method="exact").pvalue
+        found = indices.area_chances(column[:, None], group)[0]
+        assert found == pytest.approx(truth, rel=0.05 if truth > 1e-3 else 0.6)
+        # A word that 30 samples have is Fisher's exact test.
+        word = (column > np.sort(column)[-31]) + 0.0
+        hits = int(word[group].sum())
+        law = scipy.stats.hypergeom(samples, 30, inside)
+        every = np.arange(inside + 1)
+        far = np.abs(every - law.mean()) >= abs(hits - law.mean()) - 1e-9
+        found = indices.area_chances(word[:, None], group)[0]
+        assert found == pytest.approx(law.pmf(every)[far].sum())
+
+
+def test_small_groups_of_many_inputs_are_separated_by_chance_in_one_case_of_20() -> None:
+    random, told = np.random.default_rng(3), []
+    for _ in range(NOISE):
+        columns = random.random((32, 60))
+        columns[:, 40:] = columns[:, 40:] > 0.87
+        chances = indices.area_chances(columns, _group(32, int(random.integers(3, 8))))
+        told.append(chances.min() < indices.chance_of_each(60))
+    assert np.mean(told) <= MOST  # few groups are rare enough: less than one in 20
+
+
+def test_what_all_failures_have_is_named_among_many_inputs() -> None:
+    """4 of 32 rings whose motor stops, and they alone, are lost, among 80 inputs."""
+
+    def lost(x: np.ndarray) -> np.ndarray:
+        return x[:, 4] >= np.sort(x[:, 4])[-4]
+
+    made = drawn_campaign(RandomDesign(samples=32), lambda x: x[:, 0], 80, 1, lost=lost)
+    column = made["x5"].values
+    made["x5"] = "sample", (column >= np.sort(column)[-4]) + 0.0, made["x5"].attrs
+    found = analyse(made)
+    assert [row[1] for row in what_separates(found).rows] == ["x5"]
+    (table,) = worst_tables(found, "made")
+    assert all(row[2].startswith("x5 1") for row in table.rows)
+    assert found.separation_chance.sel(input="x5").item() == pytest.approx(1 / math.comb(32, 4))
+
+
+def test_few_samples_of_many_inputs_are_judged_by_plain_correlations() -> None:
+    """Of 16 samples that hold seven others even 0.9 is chance: what decides would not be told."""
+
+    def output(x: np.ndarray) -> np.ndarray:
+        return x[:, 1] + 0.1 * x[:, 0]
+
+    found = analyse(drawn_campaign(RandomDesign(samples=16), output, 8, 2))
+    assert not np.isfinite(found.asynchrony_max_partial_rank_correlation).any()
+    assert [row[1] for row in what_matters(found).rows] == ["x2"]
+    more = analyse(drawn_campaign(RandomDesign(samples=24), output, 8, 2))
+    assert np.isfinite(more.asynchrony_max_partial_rank_correlation).all()

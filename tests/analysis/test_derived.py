@@ -408,7 +408,7 @@ def test_what_is_required_on_one_side_tells_which_end_is_worse(
     assert int(found["far_apart_worst_sample"]) == worst
     (row,) = (row for row in statistics_table(found).rows if row[0] == "far_apart")
     assert row[-2] == ("-" if worst < 0 else str(worst))
-    cure = '; of far_apart worse = "larger" or "smaller" under [outputs] tells'
+    cure = '; of far_apart, worse = "larger" or "smaller" under [outputs] says it'
     unsaid = any(note.endswith(cure) for note in statistics_table(found).notes)
     assert unsaid == (worst < 0 and not more)
     one = {"far_apart": bound | BOUND} if bound else {}

@@ -18,6 +18,7 @@ from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import OF_ERRORS, told
 from ringsim.analysis.verdicts import Verdict, verdict_table
 from ringsim.refusal import InputError
+from ringsim.tables import bound_text
 from ringsim.variables import Fate, Status
 
 pytestmark = pytest.mark.quick
@@ -179,6 +180,14 @@ def test_all_requirements_together_are_counted_with_the_bound_of_what_keeps_to_a
     line = f"all 2 requirements together: {kept} of 40 samples meet them (1 failed run counted as "
     line += "not meeting them), a probability of at least"
     assert any(note.startswith(line) for note in verdict_table(found).notes)
+    few = analyse(
+        made, wanted | {"peak_tension": {"max": 0.0, "probability": 0.5, "confidence": 0.95}}
+    )
+    most = scipy.stats.beta.ppf(0.95, 1, 40)
+    assert float(few.together_probability_upper) == pytest.approx(most)
+    line = "all 2 requirements together: 0 of 40 samples meet them (1 failed run counted as not "
+    line += f"meeting them), a probability of at most {bound_text(most, upper=True)} (confidence"
+    assert any(note.startswith(line) for note in verdict_table(few).notes)
     # Where looks share the error, so does the bound of all: no more than that of any.
     rule = {"conditions": [{"requirement": name} for name in wanted], "looks": {"first": 8}}
     made.attrs["stop_when"] = json.dumps(rule)

@@ -103,7 +103,7 @@ def test_what_is_far_out_is_told_in_words() -> None:
     assert usual == "nothing unusual"
     assert odd == "section 4 of friction 0.0015 m (+50 %, the highest)"
     assert "word = b (as in 1 of 20)" in word
-    assert "temperature 343.1 K (+70 C, the highest)" in word
+    assert "temperature 343.1 K (70 C, the highest)" in word
 
 
 def test_chance_makes_one_sample_in_ten_unusual() -> None:

@@ -171,6 +171,22 @@ def test_the_tutorial_takes_five_commands(tmp_path: Path, monkeypatch: pytest.Mo
     assert (tmp_path / "stopped.nc").exists()
 
 
+def test_the_tutorial_shows_what_is_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All lines of its two listings, without the rest of what the commands print."""
+    monkeypatch.chdir(tmp_path)
+    file = str(ROOT / "campaigns" / "late_motor.toml")
+    commands = ["campaign", file, "--workers=0"], ["analyse", "runs/late-motor"]
+    for call, text in zip(commands, blocks(TUTORIAL, "text"), strict=True):
+        done = CliRunner().invoke(cli, list(call))
+        assert done.exit_code == 0, done.output
+        printed = {" ".join(line.split()) for line in done.output.splitlines()}
+        for line in (" ".join(each.split()) for each in text.splitlines()):
+            begins = any(each.startswith(line.removesuffix("...")) for each in printed)
+            assert line in printed or (line.endswith("...") and begins), line
+
+
 def test_the_tutorial_takes_twelve_lines_of_python(tmp_path: Path) -> None:
     """The same study: inputs, design and seed are those of the file; two samples of it run."""
     (text,) = blocks(TUTORIAL, "python", mark="tutorial")

@@ -233,7 +233,8 @@ def test_a_slow_flight_and_a_fast_test_have_an_axis_each(
         assert axes[0].get_xlim() == (0.0, 1.0)
         assert fast.get_xydata() == pytest.approx(slow.get_xydata())
         assert len(fast.get_xdata()) == 6
-        assert axes[-1].get_xlabel() == "Share of 5 s in ground and of 50 s in flight"
+        words = "Share of 5 s in ground and of 50 s in flight, when the last ring had opened"
+        assert axes[-1].get_xlabel() == words
     else:
         assert axes[0].get_xlim() == (0.0, 10.0)
         assert axes[-1].get_xlabel().endswith("run (s)")

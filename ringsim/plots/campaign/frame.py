@@ -228,9 +228,12 @@ def _spread(campaign: xr.Dataset, name: str) -> float:
     return float(np.ptp(values) / np.abs(values).max()) if values.any() else 0.0
 
 
-def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
+def still(
+    campaign: xr.Dataset, names: Sequence[str], others: Sequence[str] = ()
+) -> tuple[list[str], str]:  # fmt: skip
     """Those of some numbers that differ so little between samples that no figure shows it, and a
-    sentence that says so; none if all do, or where something is required of them.
+    sentence that says so of them and of ``others``; none if all do, or where something is required
+    of them.
     """
     limited = required_by(campaign.attrs) | allowables(campaign)
     known = {name: values_of(campaign, name)[1] for name in names if name not in limited}
@@ -238,12 +241,12 @@ def still(campaign: xr.Dataset, names: Sequence[str]) -> tuple[list[str], str]:
         name for name, values in known.items() if len(values) > 1
         and (hardly_apart(values.min(), values.max()) or not varies(campaign, name))
     ]  # fmt: skip
-    if not flat or len(flat) == len(names):
-        return [], ""
-    return flat, f" Not drawn, because {ALL_ALIKE}: {', '.join(flat)}."
+    flat = [] if len(flat) == len(names) else flat
+    told = dict.fromkeys([*flat, *others])
+    return flat, f" Not drawn, because {_ALL_ALIKE}: {', '.join(told)}." * bool(told)
 
 
-ALL_ALIKE = (
+_ALL_ALIKE = (
     f"samples differ by less than {100 * ALIKE:g} %, or are no farther from the mean than the "
     "numerical error"
 )

@@ -35,7 +35,6 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import one_at_a_time
 from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
-    ALL_ALIKE,
     drawable,
     head,
     in_lines,
@@ -225,7 +224,9 @@ def tornado(campaign: xr.Dataset) -> Figure:
     # Those that something is required of first: a page has no room for all.
     wanted = required_by(campaign.attrs)
     every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
-    flat, unmoved = still(population_of(campaign), drawable(campaign))
+    stand = population_of(campaign)
+    untold = [n for n in wanted if n in stand and not (varies(stand, n) or _alike(stand, n))]
+    flat, unmoved = still(stand, drawable(campaign), untold)
     every = [each for each in every if each[0] not in flat]
     quiet = [name for name, bars in every if bars.measure and not bars.names]
     every = [each for each in every if each[0] not in quiet]
@@ -272,10 +273,6 @@ def tornado(campaign: xr.Dataset) -> Figure:
         of += " An index that ends before the dashed line is drawn for the correlation below it."
     each = f"{shared[0].upper()}{shared[1:]} in each panel." if shared else ""
     caption = " ".join(filter(None, [f"{told(campaign, most)}.", each, whiskers, of]))
-    stand = population_of(campaign)
-    untold = [n for n in wanted if n in stand and not (varies(stand, n) or _alike(stand, n))]
-    if untold:
-        caption += f" Not told, because {ALL_ALIKE}: {', '.join(untold)}."
     if quiet:
         caption += f" No significant input for {', '.join(quiet)}."
     if others := [name for name, _ in every[_MOST_PANELS:]]:
@@ -402,6 +399,8 @@ _MOST_NAMED = 72
 _MOST_MOVED, _FEW_MOVES, _LOW_SHEET = 18, 24, 6
 """Panels of a sheet; moves that half its width can name, and panels up to which it needs no two
 columns."""
+_ROOM = 0.8
+"""Share of a figure's width that panels have."""
 _LEAST_SPAN = 0.02
 """Of its largest value: axes of smaller ranges are made to span twice as much."""
 
@@ -467,7 +466,10 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
         axes.set_title(style.label(campaign[name], width=120 // columns), fontsize=9.5)
     places = named(len(samples))
     few = len(samples) <= _FEW_MOVES
-    fit = partial(textwrap.fill, width=28, max_lines=3, placeholder=" ...") if few else short
+    # As many lines as find room between two marks.
+    most = min(3, max(1, int(_ROOM * 9.6 / columns / len(samples) / _LINE)))
+    wrapped = partial(textwrap.fill, width=52 - 8 * most, max_lines=most, placeholder=" ...")
+    fit = wrapped if few else short
     names_shown = [fit(words[k]) for k in places]
     for axes in panels[-columns:]:
         axes.set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
