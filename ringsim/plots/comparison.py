@@ -240,7 +240,8 @@ def courses(found: xr.Dataset, both: Both, read: dict[str, list[tuple[Array, Arr
     grid[0].set_xlim(0.0, 1.0 if apart else ends[0])
     if apart:
         first, second = map("{} s in {}".format, (number_text(e, 3) for e in ends), names_of(found))
-        grid[-1].set_xlabel(f"Share of {first} and of {second}, when the last ring had opened")
+        when = ", when the last ring had opened" * all(_opened(both))
+        grid[-1].set_xlabel(f"Share of {first} and of {second}{when}")
         grid[-1].xaxis.set_major_formatter(PercentFormatter(1.0))
     legend(figure, [*grid])
     style.title(figure, "Over time: {} and {}".format(*names_of(found)))
@@ -314,8 +315,14 @@ def _until(both: Both) -> tuple[list[float], bool]:
     if not max(ends) > _APART * min(ends) > 0.0:
         return [max(ends)] * 2, False
     # Rings that do not open run on for long: the others' courses would lie beside each other.
-    opened = [np.append(each.get("deployment_time", np.nan), 0.0) for each in both]
-    return [float(np.nanmax(o)) or end for o, end in zip(opened, ends, strict=True)], True
+    opened = _opened(both)
+    return opened if all(opened) else ends, True
+
+
+def _opened(both: Both) -> list[float]:
+    """When the last ring of either had opened, s; 0 if none has."""
+    times = (np.append(each.get("deployment_time", np.nan), 0.0) for each in both)
+    return [float(np.nanmax(each)) for each in times]
 
 
 def _last(dataset: xr.Dataset) -> float:
