@@ -205,7 +205,11 @@ def flight(number: int, runs: int) -> dict[str, Any]:
             runs_ = ringsim.Campaign(
                 scene, given, {"kind": "random", "samples": 64}, number, fidelity="frame"
             ).run(workers=0, out=folder / when)
-            ends = np.quantile(runs_["asynchrony_max"].dropna("sample"), [0.05, 0.95])
+            # The k-th of n values stands for k / (n + 1): then a further one, as the truth is, lies
+            # between the two with 90 %; of numpy's own quantiles of 64 it would be 87 %.
+            ends = np.quantile(
+                runs_["asynchrony_max"].dropna("sample"), [0.05, 0.95], method="weibull"
+            )
             found[when] = ends.tolist()
     return found
 

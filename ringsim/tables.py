@@ -110,6 +110,28 @@ def without_power(text: str, value: float) -> str:
     return f"{value:.0f}" if re.search(r"e\+0[1-5]$", text) else text
 
 
+_LONG = 100
+"""Characters of a text from which on only what differs from another one is told."""
+
+
+def where_apart(first: str, second: str) -> tuple[str, str]:
+    """Both texts, of long ones what is behind the last comma before they part.
+
+    >>> [each[:9] for each in where_apart("uniform, low 1" + 99 * " ", "uniform, low 2")]
+    ['... low 1', '... low 2']
+    """
+    if max(len(first), len(second)) <= _LONG:
+        return first, second
+    both = zip(f"{first}\n", f"{second}\t", strict=False)  # one ends, or they part, somewhere
+    parts = next((k for k, (a, b) in enumerate(both) if a != b), 0)
+    begin = first.rfind(", ", 0, parts) + 1
+    one, other = (
+        "..." * bool(begin) + text[begin : begin + _LONG] + "..." * (len(text) > begin + _LONG)
+        for text in (first, second)
+    )
+    return one, other
+
+
 def bound_text(value: float, digits: int = 4, *, upper: bool) -> str:
     """A bound with so many digits, or a dash: an upper one rounded up and a lower one down, so that
     what is printed holds as surely as what was computed.

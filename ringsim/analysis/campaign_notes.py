@@ -118,7 +118,7 @@ def ending_lines(
     return lines
 
 
-_NUMBER = re.compile(r"\d[\d.]*(?:e[+-]?\d+)?")
+_NUMBER = re.compile(r"-?\d[\d.]*(?:e[+-]?\d+)?")
 _PLACES = re.compile(r"\b(upper|lower) \d+(?:, (?:(?:upper|lower) )?\d+)*(?: and \d+ more)?")
 
 

@@ -53,6 +53,7 @@ from ringsim.outputs.base import may_be_off
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
 from ringsim.sampling.distributions import law_text
+from ringsim.tables import where_apart
 from ringsim.variables import about, flags_of
 
 Both = tuple[xr.Dataset, xr.Dataset]
@@ -213,10 +214,12 @@ def _compared(
 
 def _paired(first: Any, second: Any, replicates: list[Any]) -> intervals.Interval:
     only = int((first > second).sum()), int((second > first).sum())
-    if replicates[0] is None or sum(only) < _FEW:
+    low = high = np.nan
+    if replicates[0] is not None and sum(only) >= _FEW:
+        low, high = map(float, intervals.of_replicates(second - first, replicates[0], np.mean))
+    if np.isnan(low) or low == high:  # all pairs, or all replicates, have the same difference
         together = int((first * second).sum())
         return difference_of_pairs(together, *only, len(first) - together - sum(only))
-    low, high = intervals.of_replicates(second - first, replicates[0], np.mean)
     return max(-1.0, float(low)), min(1.0, float(high))
 
 
@@ -226,6 +229,8 @@ def _independent(first: Any, second: Any, replicates: list[Any]) -> intervals.In
     if few or all(each is None for each in replicates):
         return difference_of_shares(counts[0], counts[1])
     low, high = intervals.of_difference(first, second, tuple(replicates))
+    if np.isnan(low) or low == high:
+        return difference_of_shares(counts[0], counts[1])
     return max(-1.0, float(low)), min(1.0, float(high))
 
 
@@ -392,9 +397,11 @@ def settings(both: Both) -> dict[str, Any]:
     ]  # fmt: skip
     names = np.array(other + apart, dtype=object)
     found: dict[str, Any] = {"setting": ("setting", names)}
-    for side, scene, words in zip(SIDES, scenes, asked, strict=True):
-        fixed = {f"input {path}": f"{show(value)}, not drawn" for path, value in scene.items()}
-        told = [words.get(name, fixed.get(name, "none")) for name in other]
+    fixed = [{f"input {p}": f"{show(v)}, not drawn" for p, v in each.items()} for each in scenes]
+    known = [given | own for own, given in zip(asked, fixed, strict=True)]
+    words = [where_apart(*(each.get(name, "none") for each in known)) for name in other]
+    for k, (side, scene) in enumerate(zip(SIDES, scenes, strict=True)):
+        told = [each[k] for each in words]
         told += [show(scene[path]) if path in scene else "none" for path in apart]
         about_it = {"long_name": f"value in the {side}"}
         found[f"setting_{side}"] = "setting", np.array(told, dtype=object), about_it

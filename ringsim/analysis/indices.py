@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
 from ringsim.analysis.design import Blocks
-from ringsim.analysis.intervals import LEVEL, Mask, jackknife_error, student
+from ringsim.analysis.intervals import LEVEL, Mask, jackknife_error, of_some, student
 from ringsim.stepping.instant import Array
 
 # Rank measures of dependence between columns and an output, with intervals.
@@ -237,14 +237,14 @@ def replicate_interval(
     """Intervals of a measure from independent replicates of a design, see ``of_replicates``.
 
     ``measure`` takes which samples to use, ``to`` and ``back`` change to a scale on which it is
-    nearly normal.  NaN where a measure without some replicate is not known.
+    nearly normal.  NaN where a measure without some replicate is not known, or all agree.
     """
     which = np.unique(replicate)
     centre = to(measure(np.ones(len(replicate), dtype=bool)))
     if len(which) < 2:
         return centre + np.nan, centre + np.nan
     error = jackknife_error(np.array([to(measure(replicate != each)) for each in which]))
-    half = student(len(which)) * error
+    half = student(len(which)) * of_some(error, 1.0 + np.abs(centre))
     return back(centre - half), back(centre + half)
 
 

@@ -248,7 +248,8 @@ def of_replicates(
     """Interval of the mean or of the ``spread`` from independent replicates of a design.
 
     Jackknife that leaves out one replicate at a time, with Student's t; of the spread's logarithm.
-    ``replicate``, shape (n,), tells to which one each sample belongs.  NaN for a single one.
+    ``replicate``, shape (n,), tells to which one each sample belongs.  NaN for a single one, and
+    where values differ and all replicates agree.
     Source: Shao and Tu, The Jackknife and Bootstrap (1995), section 2.
     """
     centre, scatter, count = _jackknife(values, replicate, statistic)
@@ -270,7 +271,15 @@ def _jackknife(
     if statistic is not np.mean:
         # Where one replicate has all the spread there is no telling; none at all is no doubt.
         left_out = np.log(np.where(left_out > 0, left_out, np.where(centre > 0, np.nan, 1.0)))
-    return centre, jackknife_error(left_out), len(which)
+    error = jackknife_error(left_out)
+    return centre, np.where(np.ptp(values, axis=-1) > 0, of_some(error, centre), error), len(which)
+
+
+def of_some(error: Array, centre: Array) -> Array:
+    """Errors from the scatter of replicates; NaN where they agree but for round-off: few replicates
+    may do so by chance, as in counts, which does not make an estimate exact.
+    """
+    return np.where(error > ROUND_OFF * np.abs(centre), error, np.nan)
 
 
 def jackknife_error(left_out: Array) -> Array:
@@ -292,11 +301,15 @@ def quantile_of_replicates(
     """Interval of a quantile of values, shape (n,), from independent replicates of a design.
 
     The shares of the replicates below the quantile scatter; what their interval leaves open is
-    read off the distribution of all samples.  NaN if it reaches beyond that.
+    read off the distribution of all samples.  NaN if it reaches beyond that.  Where all have the
+    same share, the interval of independent samples.
     Source: Woodruff, J. Am. Statistical Association 47 (1952).
     """
     below = (values <= quantile(values, probability)).astype(float)
     _, scatter, count = _jackknife(below, replicate, np.mean)
+    if count > 1 and np.isnan(scatter):
+        low, high = quantile_of_independent(values, probability)
+        return float(low), float(high)
     half, least = student(count) * float(scatter), 0.5 / len(values)
     # The k-th of n values stands for the level (k - 1/2) / n: Hazen's definition.
     if not least <= probability - half <= probability + half <= 1.0 - least:
@@ -337,7 +350,7 @@ def of_difference(
     half = np.sqrt(both) * scipy.special.stdtrit(
         both**2 / np.where(each > 0, each, 1.0), 0.5 + LEVEL / 2
     )
-    half = np.where(each > 0, half, 0.0)  # no scatter at all leaves no doubt
+    half = np.where(each == 0, 0.0, half)  # no scatter at all leaves no doubt
     return apart - half, apart + half
 
 

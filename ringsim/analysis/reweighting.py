@@ -275,7 +275,7 @@ class Cap:
         if replicate is not None:
             scatter, free = standard_error(values, replicate)
             half = float(-scipy.special.stdtrit(free, error) * scatter) if free > 0 else np.nan
-            low, high = np.fmin(low, mean - half), np.fmax(high, mean + half)
+            low, high = float(np.fmin(low, mean - half)), float(np.fmax(high, mean + half))
         return max(0.0, self.weight * low), min(1.0, self.weight * high + self.beyond)
 
 

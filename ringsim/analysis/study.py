@@ -434,6 +434,8 @@ def placed_share_interval(
     if replicate is None or min(count, len(own) - count) < _FEW:
         return share_interval(count, len(own))
     low, high = intervals.of_replicates(own.astype(float), replicate, np.mean)
+    if np.isnan(low):  # all replicates have the same share
+        return share_interval(count, len(own))
     return max(0.0, float(low)), min(1.0, float(high))
 
 

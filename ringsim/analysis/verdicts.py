@@ -79,7 +79,7 @@ def bounds(
     if replicate is not None and placed.replicates > 1:
         share = float(kept.mean())
         error, free = standard_error(kept.astype(float), replicate)
-        if free > 0:
+        if free > 0 and np.isfinite(error):
             below, above = (float(scipy.special.stdtrit(free, level) * error) for level in levels)
             low, high = max(0.0, min(low, share - below)), min(1.0, max(high, share + above))
     return low, high
@@ -263,7 +263,9 @@ def _close(campaign: xr.Dataset, name: str, wanted: Requirement) -> tuple[Mask, 
     if name == OUTCOME or f"{name}_error" not in campaign:
         return np.zeros(campaign.sizes["sample"], dtype=bool), np.nan
     bars, error = bars_of(campaign, name)
-    return np.asarray(np.abs(wanted.beyond(numbers(campaign, name))) < bars), error
+    close = np.asarray(np.abs(wanted.beyond(numbers(campaign, name))) < bars)
+    others = close & ~np.isfinite(numbers(campaign, f"{name}_error"))
+    return close, float(bars[others].max()) if others.any() else error
 
 
 _FAR = 10.0
@@ -333,8 +335,9 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         error = with_unit(number_text(one["numerical_error"], 2), quantities()[name].units)
         told.append(
             f"{name}: in {counted(close, 'sample')} it is closer to the limit than its numerical "
-            f"error (the sample's own error bar, or without one {error}, the root mean square of "
-            "those that ended alike): smaller steps, or more elements, settle it"
+            f"error (the sample's own error bar, or without one at most {error}, the root mean "
+            "square of those that ended alike, of all if too few have one): smaller steps, or more "
+            "elements, settle it"
         )
     if others and name in (OUTCOME, LATCHED):
         told.append(

@@ -54,7 +54,7 @@ MOST_FAILURES = 100
 """Rows of the table of failures; the page says how many more there are."""
 _SHOWN = ("title", "source", "execution", "seed", "solver", "identity", "date_created")
 _PLACES = re.compile(
-    r" and \d+ more|(?:(?:upper|lower) )?\d[\d.e+-]*(?:, )?|samples?|latches|latch"
+    r" and \d+ more|(?:(?:upper|lower) )?-?\d[\d.e+-]*(?:, )?|samples?|latches|latch"
 )
 """What differs between antennas that ended alike: V-joints by name, numbers, and plurals."""
 _MOST_NAMED = 20

@@ -593,7 +593,8 @@ def law_text(says: Mapping[str, Any]) -> str:
     def told(value: Any) -> str:
         if isinstance(value, Mapping):
             return f"({law_text(value)})"
-        return number_text(value, 5) if isinstance(value, float) else show(value)
+        # So many characters hold all of a few faults, of which a time may differ.
+        return number_text(value, 5) if isinstance(value, float) else show(value, 600)
 
     parts = (f"{key.replace('_', ' ')} {told(value)}" for key, value in own.items())
     return ", ".join([kind, *parts])

@@ -364,6 +364,38 @@ def test_shares_of_replicates_scatter_as_these_do():
     assert found.kind_share_difference_interval.values == pytest.approx([welch.low, welch.high])
 
 
+@pytest.mark.parametrize("seeds", [(0, 0), (0, 1)])
+def test_shares_whose_replicates_agree_are_not_exact(seeds):
+    """None of 200 against all: Newcombe's interval of the pairs, or of independent samples."""
+    design = {"kind": "latin-hypercube", "samples": COUNT, "replicates": 8}
+    fates = np.full(COUNT, Fate.STALLED), np.full(COUNT, Fate.DEPLOYED)
+    one, two = (
+        seeded(VALUES, s, design=design, outcome=f) for s, f in zip(seeds, fates, strict=True)
+    )
+    found = compare(one, two).sel(kind="deployed")
+    ends = difference_of_shares((0, COUNT), (COUNT, COUNT))
+    if seeds[0] == seeds[1]:
+        ends = difference_of_pairs(0, 0, COUNT, 0)
+    assert found.kind_share_difference_interval.values == pytest.approx(ends)
+    assert ends[0] < 1.0
+
+
+def test_laws_that_differ_behind_a_long_beginning_are_told():
+    """Faults of which the times differ alone."""
+    laws = [
+        {"kind": "discrete", "values": [[{"kind": "cut-cable", "cable": "lower", "span": 1,
+         "time": time}], [{"kind": "stuck-vjoint", "plane": "upper", "section": 3, "time": 1.0}]]}
+        for time in (13.0, 400.0)
+    ]  # fmt: skip
+    one, two = (with_input(seeded(VALUES), VALUES, "faults") for _ in laws)
+    for made, law in zip((one, two), laws, strict=True):
+        made["faults"].attrs["distribution"] = json.dumps(law)
+    lines = [line for line in compared(compare(one, two)) if "input faults" in line]
+    (line,) = "\n".join(lines).splitlines()
+    assert "time = 13.0" in line
+    assert "time = 400.0" in line
+
+
 def test_of_blocks_the_samples_that_stand_for_the_population_are_compared():
     design = Saltelli(samples=16, replicates=8)
     made = drawn_campaign(design, ishigami, 3, 1)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from made import points, response
-from ringsim.analysis import intervals
+from ringsim.analysis import indices, intervals
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import samples_needed, share_bounds, share_interval
-from ringsim.analysis.study import STATISTICS, interval_of
+from ringsim.analysis.study import STATISTICS, interval_of, placed_share_interval
 
 CAMPAIGNS = 1000
 
@@ -157,3 +157,35 @@ def test_samples_that_show_a_probability(violations, probability, confidence, sa
     for count, shown in ((samples, True), (samples - 1, False)):
         low, _ = share_bounds(count - violations, count, confidence)
         assert (low >= probability) == shown
+
+
+def test_replicates_that_agree_by_chance_make_no_estimate_exact() -> None:
+    """Four replicates of eight have the same share, median, correlation: counts are few."""
+    values = np.tile(np.arange(8.0), 4)
+    replicate = np.repeat(np.arange(4), 8)
+    assert np.isnan(intervals.of_replicates(values, replicate, np.mean)).all()
+    median = intervals.quantile_of_replicates(values, replicate, 0.5)
+    assert median == tuple(float(e) for e in intervals.quantile_of_independent(values, 0.5))
+    assert median[1] > median[0]
+    # All samples alike leave no doubt, and replicates that scatter tell by how much.
+    assert intervals.of_replicates(np.ones(32), replicate, np.mean) == (1.0, 1.0)
+    scattered = values + 0.01 * replicate
+    low, high = intervals.of_replicates(scattered, replicate, np.mean)
+    assert low < high
+    both = replicate, replicate
+    assert np.isnan(intervals.of_difference(values, values + 1.0, both)).all()
+
+    def measure(rows: np.ndarray) -> np.ndarray:
+        return np.array([values[rows].mean(), scattered[rows].mean()])
+
+    lows, highs = indices.replicate_interval(measure, replicate, np.asarray, np.asarray)
+    assert np.isnan([lows[0], highs[0]]).all()
+    assert lows[1] < highs[1]
+
+
+def test_shares_of_replicates_that_agree_have_the_exact_interval() -> None:
+    own, index = np.arange(320) // 4 < 20, np.arange(320)  # twenty of eighty in each of four
+    placed = Placement("latin-hypercube", population=True, independent=False, replicates=4)
+    assert placed_share_interval(own, index, placed) == share_interval(80, 320)
+    own[0] = False
+    assert placed_share_interval(own, index, placed) != share_interval(79, 320)

@@ -235,6 +235,12 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
         columns = [("base case", course(campaign, base or 0, found))] if known else []
     if one is not None:
         columns.append((f"worst: sample {worst}", one))
+        over = (
+            float(campaign["final_time"].sel(sample=worst)) if "final_time" in campaign else np.inf
+        )
+        locked = np.isfinite(float(campaign["deployment_time"].sel(sample=worst)))
+        if over < float(found["time"][-1]) and not locked:
+            note += f" Sample {worst} was over at {over:.4g} s, and is drawn on as it ended."
     planes = found["plane"].values.tolist()
     figure = Figure(figsize=(4.9 * len(columns), 2.2 * len(planes) + 1.3))
     grid = figure.subplots(len(planes), len(columns), sharex=True, sharey=True, squeeze=False)
