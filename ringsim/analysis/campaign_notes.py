@@ -197,15 +197,18 @@ _STARTED = "_started"
 
 def plane_margin(campaign: xr.Dataset) -> str:
     """The output with the margin of one plane's own cable, where its least of all samples is less
-    than that of both together; empty if it is not.  From the start of the last winch on where one
-    starts late: before it one plane has no drive.
+    than that of both together, or more samples have less than none; empty if it is not so.  From
+    the start of the last winch on where one starts late: before it one plane has no drive.
     """
     before, later = (numbers(campaign, f"least_plane_margin{end}") for end in ("", _STARTED))
     late = _STARTED * bool((later > before)[good(campaign)].any())
     both, own = (numbers(campaign, f"least_{of}_margin{late}") for of in ("drive", "plane"))
     held = good(campaign) & np.isfinite(both) & np.isfinite(own)
     # Planes of a ring that sags a little are no news.
-    if not held.any() or not own[held].min() < both[held].min() - 5e-3:
+    if not held.any():
+        return ""
+    own, both = own[held], both[held]
+    if not own.min() < both.min() - 5e-3 and not (own < -5e-3).sum() > (both < 0.0).sum():
         return ""
     return f"least_plane_margin{late}"
 

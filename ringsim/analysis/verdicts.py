@@ -414,7 +414,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             hint = "" if OUTCOME in analysis["requirement"] else _HINT
             notes.append(
                 f"{name}: {short} of the {held} samples that meet it ended before the antenna was "
-                f"deployed, and might have violated it later{hint}"
+                f"deployed, and meet it only as far as they came{hint}"
             )
         # More samples alone would not settle what smaller steps have to.
         if one["verdict_may_change"] or verdict == Verdict.NOT_YET_SHOWN:

@@ -304,6 +304,11 @@ def test_a_plane_whose_own_cable_has_less_is_told_beside_the_margin_of_both() ->
     assert "least_plane_margin >= 0" not in str(margin_table(analyse(made)).rows)
     made["least_plane_margin"] = made["least_drive_margin"] - 0.1
     assert plane_line(made).endswith("is 0.072 (sample 1): enough")
+    # The worst of both may be alike, where a plane alone falls short in more samples.
+    made["least_drive_margin"][1] = made["least_plane_margin"][1] = -0.9
+    made["least_plane_margin"][3] = -0.4
+    assert plane_line(made).endswith("is -0.900 (sample 1): NOT enough in 2 of 4 samples")
+    made["least_drive_margin"][1] = 0.172
     # Before the last winch starts one plane has no drive, which is nothing wrong.
     made["least_plane_margin"] = made["least_drive_margin"] * 0.0 - 0.957
     made["least_drive_margin_started"] = made["least_drive_margin"] + 2.0

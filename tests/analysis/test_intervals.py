@@ -189,3 +189,12 @@ def test_shares_of_replicates_that_agree_have_the_exact_interval() -> None:
     assert placed_share_interval(own, index, placed) == share_interval(80, 320)
     own[0] = False
     assert placed_share_interval(own, index, placed) != share_interval(79, 320)
+
+
+def test_the_mean_of_what_is_never_negative_is_none_either() -> None:
+    """As the time for which motors lag: nothing in most samples."""
+    values = np.where(np.arange(32) % 16 == 0, 3.0 + np.arange(32), 0.0)
+    placed = Placement("latin-hypercube", population=True, independent=False, replicates=4)
+    low, high = placed.interval(values, np.arange(32), np.mean)
+    assert low == 0.0 < values.mean() < high
+    assert placed.interval(values - 1.0, np.arange(32), np.mean)[0] < -1.0

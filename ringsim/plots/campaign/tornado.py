@@ -357,8 +357,10 @@ def _draw(axes: Axes, bars: Bars) -> None:
     colour = _COLOURS.get(measure, style.SKY)
     _row(axes, height + shift, bars.values, bars.ends, colour, word, 0.34 if second else 0.6)
     if second:
-        _row(axes, height - shift, bars.inside, bars.inside_ends, style.ORANGE,
-             _INSIDE[measure][1], 0.34)  # fmt: skip
+        # As where it is the main measure, of outputs without an index.
+        inside, told_inside = _INSIDE[measure]
+        _row(axes, height - shift, bars.inside, bars.inside_ends,
+             _COLOURS.get(inside, style.ORANGE), told_inside, 0.34)  # fmt: skip
     if np.isfinite(bars.plain).any():
         _row(axes, height - shift, bars.plain, bars.plain_ends, style.PURPLE, "rank correlation",
              0.34)  # fmt: skip
@@ -384,7 +386,7 @@ def _row(
     if not len(values):
         return
     # Hatched, so that they are told apart in grey.
-    hatch = {style.ORANGE: "////", style.PURPLE: "...."}.get(colour, "")
+    hatch = {style.ORANGE: "////", style.GREEN: "////", style.PURPLE: "...."}.get(colour, "")
     axes.barh(height, values, height=thick, color=colour, label=label, linewidth=0.0,
               hatch=hatch, edgecolor="white")  # fmt: skip
     known = np.isfinite(ends).all(axis=1)
