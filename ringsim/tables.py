@@ -1,5 +1,6 @@
 """Tables, in Markdown and for terminals."""
 
+import itertools
 import math
 import re
 import textwrap
@@ -122,9 +123,10 @@ def where_apart(first: str, second: str) -> tuple[str, str]:
     """
     if max(len(first), len(second)) <= _LONG:
         return first, second
-    both = zip(f"{first}\n", f"{second}\t", strict=False)  # one ends, or they part, somewhere
+    both = itertools.zip_longest(first, second)
     parts = next((k for k, (a, b) in enumerate(both) if a != b), 0)
-    begin = first.rfind(", ", 0, parts) + 1
+    # What differs stands in the first half of what is told.
+    begin = max(first.rfind(", ", 0, parts) + 1, parts - _LONG // 2, 0)
     one, other = (
         "..." * bool(begin) + text[begin : begin + _LONG] + "..." * (len(text) > begin + _LONG)
         for text in (first, second)

@@ -214,12 +214,14 @@ def _compared(
 
 def _paired(first: Any, second: Any, replicates: list[Any]) -> intervals.Interval:
     only = int((first > second).sum()), int((second > first).sum())
-    low = high = np.nan
-    if replicates[0] is not None and sum(only) >= _FEW:
-        low, high = map(float, intervals.of_replicates(second - first, replicates[0], np.mean))
-    if np.isnan(low) or low == high:  # all pairs, or all replicates, have the same difference
+    apart = second - first
+    if (
+        replicates[0] is None or sum(only) < _FEW
+        or intervals.agree(apart, replicates[0]) or not np.ptp(apart)
+    ):  # fmt: skip
         together = int((first * second).sum())
         return difference_of_pairs(together, *only, len(first) - together - sum(only))
+    low, high = intervals.of_replicates(apart, replicates[0], np.mean)
     return max(-1.0, float(low)), min(1.0, float(high))
 
 
@@ -229,8 +231,6 @@ def _independent(first: Any, second: Any, replicates: list[Any]) -> intervals.In
     if few or all(each is None for each in replicates):
         return difference_of_shares(counts[0], counts[1])
     low, high = intervals.of_difference(first, second, tuple(replicates))
-    if np.isnan(low) or low == high:
-        return difference_of_shares(counts[0], counts[1])
     return max(-1.0, float(low)), min(1.0, float(high))
 
 
@@ -408,10 +408,14 @@ def settings(both: Both) -> dict[str, Any]:
     return found
 
 
+_WHOLE = 10**6
+"""Characters of a law that is compared: no less than all."""
+
+
 def _asked(campaign: xr.Dataset) -> dict[str, str]:
     """Distributions, outputs by expressions and requirements of a campaign in words, by name."""
     drawn = (campaign[name] for name in inputs(campaign))
-    laws = {f"input {called(each)}": law_text(distribution_of(each)) for each in drawn}
+    laws = {f"input {called(each)}": law_text(distribution_of(each), _WHOLE) for each in drawn}
     wanted = required_by(campaign.attrs)
     laws |= {f"output {name}": each.of for name, each in known_from(campaign.attrs).items()}
     return laws | {

@@ -130,11 +130,7 @@ class Placement:
             ends = intervals.quantile_of_independent(values, of)
         else:
             ends = intervals.quantile_of_replicates(values, replicate, of)
-        low, high = float(ends[0]), float(ends[1])
-        # What is never negative, as a time, has no negative mean.
-        if of is np.mean and values.min() >= 0.0:
-            low = max(low, 0.0)
-        return low, high
+        return float(ends[0]), float(ends[1])
 
     def error_of_mean(self, values: Array, samples: NDArray[np.int64]) -> float:
         """Standard error of the mean of these samples' values, in their unit, shapes (n,); NaN

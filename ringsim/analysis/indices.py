@@ -1,6 +1,7 @@
 """Measures of how an output goes with inputs: ranks, Sobol' indices, effects, lost runs."""
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from statistics import NormalDist
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
 from ringsim.analysis.design import Blocks
-from ringsim.analysis.intervals import LEVEL, Mask, jackknife_error, of_some, student
+from ringsim.analysis.intervals import LEVEL, ROUND_OFF, Mask, jackknife_error, student
 from ringsim.stepping.instant import Array
 
 # Rank measures of dependence between columns and an output, with intervals.
@@ -105,9 +106,9 @@ def areas(columns: Array, group: NDArray[np.bool_]) -> Array:
     return np.asarray(0.5 + centred_ranks(columns)[group].sum(axis=0) / (inside * outside))
 
 
-_COUNTED, _DRAWN = 200, 20
-"""Samples up to which all groups are counted; size of groups beyond which sums of ranks are normal:
-then their tails at 1e-4 are good to a third."""
+_COUNTED, _SMALL, _SMALL_OF_TIES = 200, 20, 500
+"""Samples up to which all groups are counted; sizes of groups beyond which sums of ranks are normal
+(their tails at 1e-4 are then good to a third), and of ranks of which most are one."""
 _GRID = 1000
 """Ranks that many samples are told apart by."""
 
@@ -125,46 +126,49 @@ def area_chances(columns: Array, group: Mask) -> Array:
         return area_chances(columns, ~group)
     found = np.ones(columns.shape[1])
     for k, ranks in enumerate(centred_ranks(columns).T):
-        apart = abs(float(ranks[group].sum()))
-        values, counts = np.unique(ranks, return_counts=True)
+        values, place, counts = np.unique(ranks, return_inverse=True, return_counts=True)
+        normal = _SMALL_OF_TIES if counts.max() > samples / 2 else _SMALL
         if len(values) < 2:
-            continue
-        if len(values) > 2 and inside > _DRAWN:
-            spread = inside * (samples - inside) / (samples - 1) * float(np.mean(ranks**2))
-            found[k] = 2.0 * scipy.special.ndtr(-apart / np.sqrt(spread))
             continue
         if len(values) == 2:
             hits = np.arange(inside + 1)
             chances = scipy.stats.hypergeom.pmf(hits, samples, int(counts[1]), inside)
-            sums = values @ [inside - hits, hits]
+            sums, apart = values @ [inside - hits, hits], float(ranks[group].sum())
+        elif inside > normal:
+            spread = inside * (samples - inside) / (samples - 1) * float(np.mean(ranks**2))
+            found[k] = 2.0 * scipy.special.ndtr(-abs(ranks[group].sum()) / np.sqrt(spread))
+            continue
         else:
-            sums, chances = _sums(tuple(counts.tolist()), inside)
-        found[k] = chances[np.abs(sums) >= apart * (1.0 - 1e-9)].sum()
+            places, sums, chances = _sums(tuple(counts.tolist()), inside)
+            apart = float(sums[places[place[group]].sum()])
+        found[k] = chances[np.abs(sums) >= abs(apart) * (1.0 - 1e-9)].sum()
     return np.minimum(found, 1.0)
 
 
 @lru_cache(maxsize=128)  # most columns have no ties, and most groups are judged again
-def _sums(counts: tuple[int, ...], inside: int) -> tuple[Array, Array]:
-    """Sums of the ranks of groups of a size (less their mean), and their probabilities, from how
-    many samples have each rank.
+def _sums(counts: tuple[int, ...], inside: int) -> tuple[NDArray[np.int64], Array, Array]:
+    """Places of the different ranks, of which sums are places, too; sums of the ranks of groups of
+    a size (less their mean), and their probabilities, from how many samples have each rank.
     """
     alike = np.array(counts)
     samples = int(alike.sum())
     values = np.cumsum(alike) - (alike - 1) / 2 - (samples + 1) / 2
-    if samples <= _COUNTED:  # groups of each size by twice their sum, a whole number
-        places = np.rint(2.0 * (values - values[0])).astype(int)
-        ways = np.zeros((inside + 1, inside * int(places[-1]) + 1))
+    step = 0.5 if samples <= _COUNTED else float(values[-1] - values[0]) / _GRID
+    places = np.rint((values - values[0]) / step).astype(np.int64)
+    size = inside * int(places[-1]) + 1
+    if samples <= _COUNTED:  # groups of each size by their sum
+        ways = np.zeros((inside + 1, size))
         ways[0, 0] = 1.0
         for place in np.repeat(places, alike).tolist():
-            ways[1:, place:] += ways[:-1, : ways.shape[1] - place].copy()
-        return inside * values[0] + 0.5 * np.arange(ways.shape[1]), ways[-1] / ways[-1].sum()
-    # Few of many: as if each was drawn from all, but for the spread.
-    step = float(values[-1] - values[0]) / _GRID
-    one = np.bincount(np.rint((values - values[0]) / step).astype(int), alike / samples)
-    size = inside * _GRID + 1
-    chances = np.fft.irfft(np.fft.rfft(one, 2 * size) ** inside, 2 * size)[:size]
-    spread = ((samples - inside) / (samples - 1)) ** 0.5
-    return spread * (inside * values[0] + step * np.arange(size)), np.maximum(chances, 0.0)
+            ways[1:, place:] += ways[:-1, : size - place].copy()
+        chances = ways[-1] / ways[-1].sum()
+    else:  # few of many: as if each was drawn from all, which makes no sum look rarer
+        one = np.bincount(places, alike / samples)
+        whole = 2 ** math.ceil(math.log2(size))
+        chances = np.fft.irfft(np.fft.rfft(one, whole) ** inside, whole)[:size]
+    middle = float(places @ alike) / samples
+    sums = np.asarray(step * (np.arange(size) - inside * middle))
+    return places, sums, np.maximum(chances, 0.0)
 
 
 def correlation_interval(found: Array, samples: int, held: int = 0) -> tuple[Array, Array]:
@@ -232,19 +236,22 @@ def area_interval(found: Array, inside: int, outside: int) -> tuple[Array, Array
 
 def replicate_interval(
     measure: Callable[[NDArray[np.bool_]], Array], replicate: NDArray[np.int64],
-    to: Callable[[Array], Array], back: Callable[[Array], Array],
+    to: Callable[[Array], Array], back: Callable[[Array], Array], *, doubt: bool = False,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Intervals of a measure from independent replicates of a design, see ``of_replicates``.
 
     ``measure`` takes which samples to use, ``to`` and ``back`` change to a scale on which it is
-    nearly normal.  NaN where a measure without some replicate is not known, or all agree.
+    nearly normal.  NaN where a measure without some replicate is not known, and with ``doubt``
+    where all agree: ranks do so by chance.
     """
     which = np.unique(replicate)
     centre = to(measure(np.ones(len(replicate), dtype=bool)))
     if len(which) < 2:
         return centre + np.nan, centre + np.nan
     error = jackknife_error(np.array([to(measure(replicate != each)) for each in which]))
-    half = student(len(which)) * of_some(error, 1.0 + np.abs(centre))
+    if doubt:
+        error = np.where(error > ROUND_OFF * (1.0 + np.abs(centre)), error, np.nan)
+    half = student(len(which)) * error
     return back(centre - half), back(centre + half)
 
 

@@ -390,7 +390,9 @@ def _correlated(
                 both = indices.correlation_interval(middle[some], len(output), int(count))
                 ends[some] = np.stack(both, axis=1)
         elif placed.has_intervals and replicate is not None:
-            both = indices.replicate_interval(measure, replicate, indices.to_normal, np.tanh)
+            both = indices.replicate_interval(
+                measure, replicate, indices.to_normal, np.tanh, doubt=True
+            )
             ends = np.stack(both, axis=1)
         results.append((middle, ends))
     return results[0], results[1]
@@ -454,7 +456,9 @@ def _separated(
         return np.where((found > 0) & (found < 1), found, np.nan)
 
     return middle, np.stack(
-        indices.replicate_interval(measure, replicate, scipy.special.logit, scipy.special.expit),
+        indices.replicate_interval(
+            measure, replicate, scipy.special.logit, scipy.special.expit, doubt=True
+        ),
         axis=1,
     )
 

@@ -248,15 +248,19 @@ def of_replicates(
     """Interval of the mean or of the ``spread`` from independent replicates of a design.
 
     Jackknife that leaves out one replicate at a time, with Student's t; of the spread's logarithm.
-    ``replicate``, shape (n,), tells to which one each sample belongs.  NaN for a single one, and
-    where values differ and all replicates agree.
+    ``replicate``, shape (n,), tells to which one each sample belongs.  NaN for a single one; of
+    ``agreeing`` ones the interval of independent samples.
     Source: Shao and Tu, The Jackknife and Bootstrap (1995), section 2.
     """
     centre, scatter, count = _jackknife(values, replicate, statistic)
-    half = student(count) * scatter
-    if statistic is np.mean:
-        return centre - half, centre + half
-    return centre * np.exp(-half), centre * np.exp(half)
+    half, alike = student(count) * scatter, agreeing(values, scatter)
+    low, high = centre - half, centre + half
+    if statistic is not np.mean:
+        low, high = centre * np.exp(-half), centre * np.exp(half)
+    if not alike.any():
+        return low, high
+    ends = of_independent(values, statistic)
+    return np.where(alike, ends[0], low), np.where(alike, ends[1], high)
 
 
 def _jackknife(
@@ -271,21 +275,26 @@ def _jackknife(
     if statistic is not np.mean:
         # Where one replicate has all the spread there is no telling; none at all is no doubt.
         left_out = np.log(np.where(left_out > 0, left_out, np.where(centre > 0, np.nan, 1.0)))
-    error = jackknife_error(left_out)
-    return centre, np.where(np.ptp(values, axis=-1) > 0, of_some(error, centre), error), len(which)
+    return centre, jackknife_error(left_out), len(which)
 
 
-def of_some(error: Array, centre: Array) -> Array:
-    """Errors from the scatter of replicates; NaN where they agree but for round-off: few replicates
-    may do so by chance, as in counts, which does not make an estimate exact.
+def agreeing(values: Array, error: Array) -> Mask:
+    """Where replicates agree but for round-off in an estimate from values that differ: counts do so
+    by chance, and where a stratum decides them always, which does not make the estimate exact.
     """
-    return np.where(error > ROUND_OFF * np.abs(centre), error, np.nan)
+    size, spread = np.abs(values).max(axis=-1), np.ptp(values, axis=-1)
+    return np.asarray((spread > ROUND_OFF * size) & (error <= ROUND_OFF * spread))
 
 
 def jackknife_error(left_out: Array) -> Array:
     """Standard error from the estimates without each of the replicates, shape (replicates, ...)."""
     squares = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
     return np.asarray(np.sqrt(squares * (len(left_out) - 1) / len(left_out)))
+
+
+def agree(values: Array, replicate: NDArray[np.int64]) -> bool:
+    """Whether all replicates have the same mean of values, shape (n,), that differ."""
+    return bool(agreeing(values, _jackknife(values, replicate, np.mean)[1]))
 
 
 def student(replicates: int) -> float:
@@ -302,12 +311,12 @@ def quantile_of_replicates(
 
     The shares of the replicates below the quantile scatter; what their interval leaves open is
     read off the distribution of all samples.  NaN if it reaches beyond that.  Where all have the
-    same share, the interval of independent samples.
+    same share, as of a quantile that is the largest value, the interval of independent samples.
     Source: Woodruff, J. Am. Statistical Association 47 (1952).
     """
     below = (values <= quantile(values, probability)).astype(float)
     _, scatter, count = _jackknife(below, replicate, np.mean)
-    if count > 1 and np.isnan(scatter):
+    if count > 1 and scatter <= ROUND_OFF:
         low, high = quantile_of_independent(values, probability)
         return float(low), float(high)
     half, least = student(count) * float(scatter), 0.5 / len(values)
@@ -320,11 +329,13 @@ def quantile_of_replicates(
 
 def standard_error(values: Array, replicate: NDArray[np.int64] | None) -> tuple[Array, int]:
     """Standard error of the mean of independent samples, or of independent replicates (given which
-    one each sample belongs to), and its degrees of freedom; NaN if there is one alone.
+    one each sample belongs to; of ``agreeing`` ones as of independent samples), and its degrees of
+    freedom; NaN if there is one alone.
     """
     if replicate is not None:
         _, error, count = _jackknife(values, replicate, np.mean)
-        return error, count - 1
+        alike = agreeing(values, error)
+        return np.where(alike, spread(values) / values.shape[-1] ** 0.5, error), count - 1
     count = values.shape[-1]
     if count < 2:
         return np.full(values.shape[:-1], np.nan), 0
@@ -350,7 +361,7 @@ def of_difference(
     half = np.sqrt(both) * scipy.special.stdtrit(
         both**2 / np.where(each > 0, each, 1.0), 0.5 + LEVEL / 2
     )
-    half = np.where(each == 0, 0.0, half)  # no scatter at all leaves no doubt
+    half = np.where(each > 0, half, 0.0)  # no scatter at all leaves no doubt
     return apart - half, apart + half
 
 

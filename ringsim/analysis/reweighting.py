@@ -121,7 +121,8 @@ def share_interval(own: Mask, weights: Array, replicate: Replicate) -> Interval:
     share = 1.0 if own.all() else share  # not a bit less by round-off
     if replicate is not None and not few:
         low, high = mean_interval(own.astype(float), weights, replicate)
-        return max(0.0, low), min(1.0, high)
+        if low < high:  # replicates that agree say nothing
+            return max(0.0, low), min(1.0, high)
     count = effective(weights)
     if count <= 2:
         return NONE

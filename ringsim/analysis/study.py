@@ -431,11 +431,14 @@ def placed_share_interval(
     if not placed.has_intervals or not len(own):
         return NONE
     replicate, count = placed.replicate_of(samples), int(own.sum())
-    if replicate is None or min(count, len(own) - count) < _FEW:
+    values = own.astype(float)
+    if (
+        replicate is None
+        or min(count, len(own) - count) < _FEW
+        or intervals.agree(values, replicate)
+    ):
         return share_interval(count, len(own))
-    low, high = intervals.of_replicates(own.astype(float), replicate, np.mean)
-    if np.isnan(low):  # all replicates have the same share
-        return share_interval(count, len(own))
+    low, high = intervals.of_replicates(values, replicate, np.mean)
     return max(0.0, float(low)), min(1.0, float(high))
 
 

@@ -132,7 +132,7 @@ def _together(
 ) -> dict[str, Any]:  # fmt: skip
     """Samples that keep to all of several requirements, of those that have run, and the bounds of
     their probability, each with the largest confidence of them all, at all looks of a rule at once
-    as their own bounds; failed runs keep to none.
+    as their own bounds; failed runs keep to none for the lower one, and to all for the upper.
     """
     run = good(campaign) | lost(campaign)
     if len(requirements) < 2 or not run.any():
@@ -142,12 +142,17 @@ def _together(
         kept &= ~violations(campaign, name, wanted)
     sure, ends = max(each.confidence for each in requirements.values()), (np.nan, np.nan)
     looked = int(run.sum())
-    level = sure if rule is None else max(
-        rule.levels(name, wanted, looked, placed.replicates)[0]
-        for name, wanted in requirements.items()
-    )  # fmt: skip
-    if placed.population:
-        ends = bounds(kept[run], campaign["sample"].to_numpy()[run], (level, level), placed)
+    levels = [sure, sure] if rule is None else [
+        max(each) for each in zip(*(
+            rule.levels(name, wanted, looked, placed.replicates)
+            for name, wanted in requirements.items()
+        ), strict=True)
+    ]  # fmt: skip
+    if placed.population:  # what failed runs would have done, nobody knows
+        index, level = campaign["sample"].to_numpy()[run], (levels[0], levels[1])
+        sides = (bounds(own[run], index, level, placed) for own in (kept, kept | lost(campaign)))
+        least, most = sides
+        ends = least[0], most[1]
     return {
         "together_samples": ((), int(kept.sum()), about("samples that keep to all requirements")),
         "together_lost": ((), int(lost(campaign).sum()), about("of these, failed runs")),

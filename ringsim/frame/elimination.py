@@ -65,8 +65,8 @@ class Fronts(NamedTuple):
 class Border(NamedTuple):
     """Room for columns of the border, shape (unknowns * k,), for rows of a hub, (3 * unknowns,),
     for how the ropes' points move with each column, (3 * points * k,), and for its own block,
-    (k * k,), factored with pivots, (k,); what is in use: its number of columns, whether the first
-    three are a hub's, and factors of the ropes, (3,).
+    (k * k,), factored with pivots, (k,); what is in use: its number of columns, whether strings
+    pull at the hub, factors of the ropes, and columns of the hub, the first ones, (4,).
 
     k is a whole number of eights: columns of zeros, whose unknowns are zero, fill the last.
     ``alone``, N/m, shape (1,), is the inertia of a hub that no string pulls: it moves by this
@@ -88,5 +88,5 @@ class Border(NamedTuple):
         columns, rows, moved = unknowns * k, 3 * unknowns * hub, 3 * points * k
         return cls(
             np.zeros(columns), np.zeros(rows), np.zeros(moved), np.zeros(k * k), np.full(1, np.nan),
-            np.zeros(k, dtype=np.int64), np.zeros(3, dtype=np.int64),
+            np.zeros(k, dtype=np.int64), np.zeros(4, dtype=np.int64),
         )  # fmt: skip

@@ -230,7 +230,8 @@ def _deployed(scene: "Scene") -> Array:
     if not _opened or _opened[0][0] is not scene:
         layout = layout_at_opening(scene.model_copy(update={"net": None}), math.pi)
         _opened[:] = [(scene, np.array([body.pose.place for body in layout.bodies]))]
-    return _opened[0][1]
+    (_, places), *_ = _opened
+    return places
 
 
 class BodyRef(NamedTuple):

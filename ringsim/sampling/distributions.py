@@ -564,7 +564,7 @@ class Function(Distribution):
         return np.asarray(np.interp(given, np.array(keys, dtype=float), values))
 
 
-def law_text(says: Mapping[str, Any]) -> str:
+def law_text(says: Mapping[str, Any], most: int = 600) -> str:
     """A distribution in words: its kind, and its parameters without those that place it.
 
     >>> law_text({"kind": "uniform", "each_section": False, "low": 0.7, "high": 1.0})
@@ -592,9 +592,9 @@ def law_text(says: Mapping[str, Any]) -> str:
 
     def told(value: Any) -> str:
         if isinstance(value, Mapping):
-            return f"({law_text(value)})"
+            return f"({law_text(value, most)})"
         # So many characters hold all of a few faults, of which a time may differ.
-        return number_text(value, 5) if isinstance(value, float) else show(value, 600)
+        return number_text(value, 5) if isinstance(value, float) else show(value, most)
 
     parts = (f"{key.replace('_', ' ')} {told(value)}" for key, value in own.items())
     return ", ".join([kind, *parts])

@@ -190,3 +190,27 @@ def test_few_samples_of_many_inputs_are_judged_by_plain_correlations() -> None:
     assert [row[1] for row in what_matters(found).rows] == ["x2"]
     more = analyse(drawn_campaign(RandomDesign(samples=24), output, 8, 2))
     assert np.isfinite(more.asynchrony_max_partial_rank_correlation).all()
+
+
+@pytest.mark.parametrize(("samples", "inside"), [(256, 4), (500, 12), (300, 20), (400, 25)])
+def test_the_chance_of_a_separation_by_columns_with_ties_is_no_less_than_it_is(
+    samples: int, inside: int
+) -> None:
+    """Of many samples: mostly zeros, counts, three values."""
+    random = np.random.default_rng(samples)
+    zeros = np.where(random.random(samples) < 0.97, 0.0, random.random(samples))
+    three = random.choice([0.0, 1.0, 2.0], samples, p=[0.05, 0.9, 0.05])
+    columns = np.stack([zeros, random.poisson(2.0, samples) + 0.0, three], axis=1)
+    chances = []
+    for _ in range(2000):
+        group = np.zeros(samples, dtype=bool)
+        group[random.choice(samples, inside, replace=False)] = True
+        chances.append(indices.area_chances(columns, group))
+    told = np.array(chances)
+    for level in (0.05, 0.01):
+        most = level + 3.0 * (level * (1.0 - level) / 2000) ** 0.5
+        assert (told < level).mean(axis=0).max() <= most
+    # None of the few that differ: the commonest group is no surprise.
+    group = np.zeros(samples, dtype=bool)
+    group[np.flatnonzero(zeros == 0.0)[:inside]] = True
+    assert indices.area_chances(columns[:, :1], group)[0] > 0.3

@@ -394,6 +394,14 @@ def test_laws_that_differ_behind_a_long_beginning_are_told():
     (line,) = "\n".join(lines).splitlines()
     assert "time = 13.0" in line
     assert "time = 400.0" in line
+    many = [
+        {"kind": "stuck-vjoint", "plane": "upper", "section": k, "time": 1.0} for k in range(20)
+    ]
+    for made, time in ((one, 1.0), (two, 400.0)):
+        law = {"kind": "discrete", "values": [many[:-1] + [many[-1] | {"time": time}], []]}
+        made["faults"].attrs["distribution"] = json.dumps(law)
+    (line,) = "\n".join(li for li in compared(compare(one, two)) if "input f" in li).splitlines()
+    assert "time = 400.0" in line
 
 
 def test_of_blocks_the_samples_that_stand_for_the_population_are_compared():

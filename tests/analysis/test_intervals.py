@@ -163,7 +163,18 @@ def test_replicates_that_agree_by_chance_make_no_estimate_exact() -> None:
     """Four replicates of eight have the same share, median, correlation: counts are few."""
     values = np.tile(np.arange(8.0), 4)
     replicate = np.repeat(np.arange(4), 8)
-    assert np.isnan(intervals.of_replicates(values, replicate, np.mean)).all()
+    for statistic in (np.mean, intervals.spread):
+        found = intervals.of_replicates(values, replicate, statistic)
+        assert np.array(found) == pytest.approx(
+            np.array(intervals.of_independent(values, statistic))
+        )
+        assert found[0] < found[1]
+    # A constant shift, but for round-off, is no scatter.
+    shifts = (values + 0.1) - values
+    assert np.ptp(shifts) > 0.0
+    found = intervals.of_replicates(shifts, replicate, np.mean)
+    assert np.array(found) == pytest.approx([0.1, 0.1])
+    assert np.isnan(intervals.quantile_of_replicates(values, replicate, 0.95)).all()
     median = intervals.quantile_of_replicates(values, replicate, 0.5)
     assert median == tuple(float(e) for e in intervals.quantile_of_independent(values, 0.5))
     assert median[1] > median[0]
@@ -173,14 +184,18 @@ def test_replicates_that_agree_by_chance_make_no_estimate_exact() -> None:
     low, high = intervals.of_replicates(scattered, replicate, np.mean)
     assert low < high
     both = replicate, replicate
-    assert np.isnan(intervals.of_difference(values, values + 1.0, both)).all()
+    ends = intervals.of_difference(values, values + 1.0, both)
+    assert ends[1] - ends[0] > 2.0 * values.std() / 32**0.5
 
     def measure(rows: np.ndarray) -> np.ndarray:
         return np.array([values[rows].mean(), scattered[rows].mean()])
 
-    lows, highs = indices.replicate_interval(measure, replicate, np.asarray, np.asarray)
+    given = measure, replicate, np.asarray, np.asarray
+    lows, highs = indices.replicate_interval(*given, doubt=True)
     assert np.isnan([lows[0], highs[0]]).all()
     assert lows[1] < highs[1]
+    lows, highs = indices.replicate_interval(*given)  # as of an index that is none
+    assert lows[0] == highs[0]
 
 
 def test_shares_of_replicates_that_agree_have_the_exact_interval() -> None:
@@ -189,12 +204,3 @@ def test_shares_of_replicates_that_agree_have_the_exact_interval() -> None:
     assert placed_share_interval(own, index, placed) == share_interval(80, 320)
     own[0] = False
     assert placed_share_interval(own, index, placed) != share_interval(79, 320)
-
-
-def test_the_mean_of_what_is_never_negative_is_none_either() -> None:
-    """As the time for which motors lag: nothing in most samples."""
-    values = np.where(np.arange(32) % 16 == 0, 3.0 + np.arange(32), 0.0)
-    placed = Placement("latin-hypercube", population=True, independent=False, replicates=4)
-    low, high = placed.interval(values, np.arange(32), np.mean)
-    assert low == 0.0 < values.mean() < high
-    assert placed.interval(values - 1.0, np.arange(32), np.mean)[0] < -1.0

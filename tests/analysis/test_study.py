@@ -183,7 +183,7 @@ def test_all_requirements_together_are_counted_with_the_bound_of_what_keeps_to_a
     few = analyse(
         made, wanted | {"peak_tension": {"max": 0.0, "probability": 0.5, "confidence": 0.95}}
     )
-    most = scipy.stats.beta.ppf(0.95, 1, 40)
+    most = scipy.stats.beta.ppf(0.95, 2, 39)  # the failed run may have met them
     assert float(few.together_probability_upper) == pytest.approx(most)
     line = "all 2 requirements together: 0 of 40 samples meet them (1 failed run counted as not "
     line += f"meeting them), a probability of at most {bound_text(most, upper=True)} (confidence"

@@ -121,6 +121,26 @@ def test_tangent_of_pulleys(friction: dict[str, Any]) -> None:
     assert error(Probe(made, 1e-6, time=0.5, step=1e-2)) < 1e-4
 
 
+@pytest.mark.parametrize("taut", [True, False])
+def test_a_tangent_outlives_the_pull_of_its_strings(taut: bool) -> None:
+    """Strings of a hub turn taut or slack between two tangents: solutions are those of the last."""
+    net = NET | {"neutral_length": 0.1 if taut else 9.0}
+    made = scene("ring18-cable", structure__sections=6, net=net, boom="none")
+    probe = Probe(made, 1e-5, time=1e-2, step=1e-2)
+    model, first = probe.model, probe.solved()
+    assert model.cables is not None
+    used, row = model.cables.roped.border.used, np.linspace(0.0, 1.0, model.size)
+    assert bool(used[1]) == taut
+    solutions = []
+    for _ in range(2):
+        x = row.copy()
+        call("relax", model.system, model.cables.roped, x)
+        solutions.append(x)
+        used[1] = not taut
+    assert np.isfinite(first).all()
+    assert solutions[0].tolist() == solutions[1].tolist()
+
+
 @pytest.mark.parametrize(
     "values",
     [{"boom": "none", "structure.sections": n} for n in (3, 4, 5, 18)]

@@ -128,8 +128,9 @@ typedef struct {
 /* Length (m) below which a span is none. */
 static const D SHORTEST = 1e-9;
 
-/* Places of used: columns in use, whether the first three are a hub's, and factors of the ropes. */
-enum { WIDE_USED, STRUNG, FACTORS };
+/* Places of used: columns in use, whether strings pull at the hub now, factors of the ropes, and hub's
+   columns, the first ones: those of the last tangent, which may outlive the pull of its strings. */
+enum { WIDE_USED, STRUNG, FACTORS, OF_HUB };
 
 /* ringsim.core.chain.Seen */
 typedef struct {

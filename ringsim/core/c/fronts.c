@@ -263,14 +263,14 @@ void take_rows(const D *rows, I count, I size, const D *columns, I n, D *corner)
 bool close_border(const System *system, const Roped *roped) {
     const Mesh *mesh = &system->mesh;
     const Border *border = &roped->border;
-    I n = border->used.at[WIDE_USED], strung = border->used.at[STRUNG], factors = border->used.at[FACTORS];
+    I n = border->used.at[WIDE_USED], factors = border->used.at[FACTORS], of_hub = border->used.at[OF_HUB];
     D *a = border->corner.at, *columns = border->columns.at;
     solve(mesh, &system->fronts, columns, mesh->unknowns * n);
-    if (strung) take_rows(border->hub.at, 3, mesh->unknowns, columns, n, a);
+    take_rows(border->hub.at, of_hub, mesh->unknowns, columns, n, a);
     if (factors > 0) {
         I size = 3 * system->paths.frame.n;
         move_paths(&system->paths, mesh, &system->arms, columns, n, border->moved.at);
-        take_rows(roped->factors.at + factors * size, factors, size, border->moved.at, n, a + 3 * strung * n);
+        take_rows(roped->factors.at + factors * size, factors, size, border->moved.at, n, a + of_hub * n);
     }
     for (I k = 0; k < n; k++) {
         I best = k;
@@ -291,19 +291,19 @@ bool close_border(const System *system, const Roped *roped) {
     return true;
 }
 
-/* A solution x of the fronts alone becomes that of all; behind the fronts' unknowns come, if it is
-   strung, those of a hub. */
+/* A solution x of the fronts alone becomes that of all; behind the fronts' unknowns come those of a
+   hub.  Points move by arms as they are now, which turn little between two tangents. */
 void cross_border(const System *system, const Roped *roped, D *x) {
     const Border *border = &roped->border;
     I unknowns = system->mesh.unknowns, size = 3 * system->paths.frame.n;
-    I n = border->used.at[WIDE_USED], strung = border->used.at[STRUNG], factors = border->used.at[FACTORS];
+    I n = border->used.at[WIDE_USED], factors = border->used.at[FACTORS], of_hub = border->used.at[OF_HUB];
     const D *a = border->corner.at, *changes = roped->factors.at + factors * size;
     D z[n], *moved = border->moved.at;
     memset(z, 0, sizeof z);
-    for (I k = 0; k < 3 * strung; k++)
+    for (I k = 0; k < of_hub; k++)
         z[k] = x[unknowns + k] - product(border->hub.at + k * unknowns, x, unknowns);
     if (factors > 0) move_paths(&system->paths, &system->mesh, &system->arms, x, 1, moved);
-    for (I k = 0; k < factors; k++) z[3 * strung + k] = -product(changes + k * size, moved, size);
+    for (I k = 0; k < factors; k++) z[of_hub + k] = -product(changes + k * size, moved, size);
     for (I k = 0; k < n; k++) {
         I best = border->pivots.at[k];
         D own = z[best];
@@ -316,7 +316,7 @@ void cross_border(const System *system, const Roped *roped, D *x) {
         for (I i = 0; i < k; i++) z[i] -= a[i * n + k] * z[k];
     }
     for (I u = 0; u < unknowns; u++) x[u] -= product(border->columns.at + u * n, z, n);
-    for (I k = 0; k < 3 * strung; k++) x[unknowns + k] = z[k];
+    for (I k = 0; k < of_hub; k++) x[unknowns + k] = z[k];
 }
 
 /* What ringsim.frame.elimination counts with, too. */

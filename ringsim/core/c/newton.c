@@ -102,6 +102,7 @@ I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, con
     }
     I wide = (factors + 3 * strung + 7) / 8 * 8;
     border->used.at[WIDE_USED] = wide, border->used.at[FACTORS] = factors;
+    border->used.at[OF_HUB] = 3 * strung;
     border->alone.at[0] = system->hub && !strung ? system->web.hub_mass * by_place : NAN;
     memset(border->columns.at, 0, (size_t)(mesh->unknowns * wide) * sizeof(D));
     if (strung) memset(border->hub.at, 0, (size_t)(3 * mesh->unknowns) * sizeof(D));

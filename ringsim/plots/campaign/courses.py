@@ -238,7 +238,8 @@ def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
         over = (
             float(campaign["final_time"].sel(sample=worst)) if "final_time" in campaign else np.inf
         )
-        locked = np.isfinite(float(campaign["deployment_time"].sel(sample=worst)))
+        times = campaign.get("deployment_time", campaign["sample"] * np.nan)
+        locked = np.isfinite(float(times.sel(sample=worst)))
         if over < float(found["time"][-1]) and not locked:
             note += f" Sample {worst} was over at {over:.4g} s, and is drawn on as it ended."
     planes = found["plane"].values.tolist()
