@@ -398,7 +398,7 @@ def test_laws_that_differ_behind_a_long_beginning_are_told():
         {"kind": "stuck-vjoint", "plane": "upper", "section": k, "time": 1.0} for k in range(20)
     ]
     for made, time in ((one, 1.0), (two, 400.0)):
-        law = {"kind": "discrete", "values": [many[:-1] + [many[-1] | {"time": time}], []]}
+        law = {"kind": "discrete", "values": [[*many[:-1], many[-1] | {"time": time}], []]}
         made["faults"].attrs["distribution"] = json.dumps(law)
     (line,) = "\n".join(li for li in compared(compare(one, two)) if "input f" in li).splitlines()
     assert "time = 400.0" in line
