@@ -334,8 +334,9 @@ def standard_error(values: Array, replicate: NDArray[np.int64] | None) -> tuple[
     """
     if replicate is not None:
         _, error, count = _jackknife(values, replicate, np.mean)
-        alike = agreeing(values, error)
-        return np.where(alike, spread(values) / values.shape[-1] ** 0.5, error), count - 1
+        if (alike := agreeing(values, error)).any():
+            error = np.where(alike, spread(values) / values.shape[-1] ** 0.5, error)
+        return error, count - 1
     count = values.shape[-1]
     if count < 2:
         return np.full(values.shape[:-1], np.nan), 0

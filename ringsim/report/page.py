@@ -276,9 +276,11 @@ def page(
     analysis = analyse(campaign) if analysis is None else analysis
     wanted = campaign_file(campaign)
     fell_short, more = failures(campaign, folder)
-    short = campaign["sample"].values[~np.isin(endings(campaign), (*REACHED, UNKNOWN, NOT_RUN))]
-    if _all_told(campaign, short.tolist(), worst_tables(analysis, folder)):
-        fell_short = []
+    ended = endings(campaign).astype(str)
+    short = ~np.isin(ended, (*REACHED, UNKNOWN, NOT_RUN))
+    sound = campaign["sample"].values[short & ~np.char.startswith(ended, LOST)].tolist()
+    if _all_told(campaign, sound, worst_tables(analysis, folder)):
+        fell_short = [row for row in fell_short if row[1].startswith(LOST)]
     apart = [] if measurement is None else residuals(campaign, measurement)  # refuses others' tests
     shown = player(campaign, analysis, measurement)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
@@ -301,7 +303,7 @@ def page(
                   if name in campaign},
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign),
-        "player": shown, "failures": fell_short, "more": more, "short": bool(short.size),
+        "player": shown, "failures": fell_short, "more": more, "short": bool(short.any()),
         "worst_note": note_on_unusual(analysis),
         "players": {str(sample): k for sample, k in places.items()},
         "notes": [*restart_lines(campaign), *override_lines(campaign)],

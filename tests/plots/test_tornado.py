@@ -128,7 +128,7 @@ def test_what_all_samples_have_in_common_needs_no_word() -> None:
     campaign.attrs["requirements"] = json.dumps(wanted)
     (legend,) = tornado(campaign).legends
     told = " ".join(legend.get_title().get_text().split())
-    assert f"Not told, because {ALL_ALIKE}: deployment_time." in told
+    assert f"Not drawn, because {ALL_ALIKE}: deployment_time." in told
     assert "outcome" not in told
 
 

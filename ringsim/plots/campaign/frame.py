@@ -243,10 +243,10 @@ def still(
     ]  # fmt: skip
     flat = [] if len(flat) == len(names) else flat
     told = dict.fromkeys([*flat, *others])
-    return flat, f" Not drawn, because {_ALL_ALIKE}: {', '.join(told)}." * bool(told)
+    return flat, f" Not drawn, because {ALL_ALIKE}: {', '.join(told)}." * bool(told)
 
 
-_ALL_ALIKE = (
+ALL_ALIKE = (
     f"samples differ by less than {100 * ALIKE:g} %, or are no farther from the mean than the "
     "numerical error"
 )
