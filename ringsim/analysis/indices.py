@@ -108,18 +108,19 @@ def areas(columns: Array, group: NDArray[np.bool_]) -> Array:
 
 _COUNTED, _SMALL, _SMALL_OF_TIES = 200, 20, 500
 """Samples up to which all groups are counted; sizes of groups beyond which sums of ranks are normal
-(their tails at 1e-4 are then good to a third), and of ranks of which most are one."""
+(their tails at 1e-4 are then good to 40 %), and of ranks of which most are one."""
 _GRID = 1000
 """Ranks that many samples are told apart by."""
 
 
 def area_chances(columns: Array, group: Mask) -> Array:
     """Probability that the area of a column differs from a half by as much where the group is drawn
-    by lot, shape (columns,): of few failures all may have what a tenth of the samples has, and no
-    normal distribution says how rarely.
+    by lot, shape (columns,), of columns, (samples, columns), and who is in the group, (samples,):
+    of few failures all may have what a tenth of the samples has, and no normal distribution says
+    how rarely.
 
-    Mann and Whitney's statistic with ties, of all groups of the size; of columns with two values it
-    is Fisher's exact test.
+    Mann and Whitney's statistic (1947; see ``areas``) with ties, of all groups of the size; of
+    columns with two values it is Fisher's exact test.
     """
     inside, samples = int(group.sum()), len(group)
     if 2 * inside > samples:

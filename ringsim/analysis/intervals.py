@@ -279,8 +279,9 @@ def _jackknife(
 
 
 def agreeing(values: Array, error: Array) -> Mask:
-    """Where replicates agree but for round-off in an estimate from values that differ: counts do so
-    by chance, and where a stratum decides them always, which does not make the estimate exact.
+    """Where replicates agree but for round-off in an estimate from values, shape (..., n), that
+    differ, by its standard error, shape (...): counts do so by chance, and always where a stratum
+    decides them, which does not make the estimate exact.
     """
     size, spread = np.abs(values).max(axis=-1), np.ptp(values, axis=-1)
     return np.asarray((spread > ROUND_OFF * size) & (error <= ROUND_OFF * spread))

@@ -358,11 +358,12 @@ def _together_told(analysis: xr.Dataset, count: int) -> str:
     names = ("samples", "of", "probability_lower", "probability_upper", "confidence")
     kept, run, least, most, sure = (float(analysis[f"together_{name}"]) for name in names)
     told = f"all {count} requirements together: {kept:.0f} of {run:.0f} samples meet them"
+    # Of few that meet them all the upper bound says more, and of none the lower one nothing.
+    upper = 2.0 * kept < run
     if failed := int(analysis["together_lost"]):
-        told += f" ({counted(failed, 'failed run')} counted as not meeting them)"
+        how = "that may have met them" if upper else "counted as not meeting them"
+        told += f" ({counted(failed, 'failed run')} {how})"
     if np.isfinite(least):
-        # Of few that meet them all the upper bound says more, and of none the lower one nothing.
-        upper = 2.0 * kept < run
         bound = bound_text(most if upper else least, upper=upper)
         told += (
             f", a probability of at {'most' if upper else 'least'} {bound} (confidence {sure:g})"

@@ -312,11 +312,12 @@ def _until(both: Both) -> tuple[list[float], bool]:
         min(_last(each), shown_until(each)[0]) if "sample" in each.dims else _last(each)
         for each in both
     ]
-    if not max(ends) > _APART * min(ends) > 0.0:
-        return [max(ends)] * 2, False
     # Rings that do not open run on for long: the others' courses would lie beside each other.
     opened = _opened(both)
-    return opened if all(opened) else ends, True
+    marks = opened if all(opened) else ends
+    if not max(marks) > _APART * min(marks) > 0.0:
+        return [max(ends)] * 2, False
+    return marks, True
 
 
 def _opened(both: Both) -> list[float]:

@@ -185,8 +185,8 @@ def test_all_requirements_together_are_counted_with_the_bound_of_what_keeps_to_a
     )
     most = scipy.stats.beta.ppf(0.95, 2, 39)  # the failed run may have met them
     assert float(few.together_probability_upper) == pytest.approx(most)
-    line = "all 2 requirements together: 0 of 40 samples meet them (1 failed run counted as not "
-    line += f"meeting them), a probability of at most {bound_text(most, upper=True)} (confidence"
+    line = "all 2 requirements together: 0 of 40 samples meet them (1 failed run that may have met "
+    line += f"them), a probability of at most {bound_text(most, upper=True)} (confidence"
     assert any(note.startswith(line) for note in verdict_table(few).notes)
     # Where looks share the error, so does the bound of all: no more than that of any.
     rule = {"conditions": [{"requirement": name} for name in wanted], "looks": {"first": 8}}
