@@ -32,7 +32,7 @@ from ringsim.campaign.specification import Campaign, Stages, campaign_of
 from ringsim.files import parse_toml, read_text, whole, writing
 from ringsim.measured import Measurement, load_measured
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
-from ringsim.sampling.columns import Table, add_inputs, correlate, pairs_of
+from ringsim.sampling.columns import Axis, Table, add_inputs, alike, correlate, pairs_of
 from ringsim.sampling.designs.independent import sobol_points
 from ringsim.sampling.distributions import Array, Calibrated, Ranged, inside
 from ringsim.scene import Scene
@@ -128,23 +128,6 @@ def calibration_of(
 
 
 @dataclass(frozen=True)
-class Axis:
-    """One unknown number: an axis of standard normal space."""
-
-    name: str
-    """Path or name in a campaign file, with the place where there is one for each."""
-    law: Ranged | Calibrated
-    """Its prior."""
-    units: str
-    group: str
-    """Of what it is one place: the key that it is drawn for, without a place."""
-    input: str
-    """The key that it is drawn for."""
-    shared: tuple[str, ...] = ()
-    """Scene paths that all take it, if not the name alone."""
-
-
-@dataclass(frozen=True)
 class Unknowns:
     """The unknowns of a calibration: those of the scene, then those of the measured clock."""
 
@@ -185,6 +168,7 @@ class Unknowns:
                     )
                 own = f"clock.{name}"
                 found[own] = Axis(own, law, units, own, own)
+        found = alike(found)
         matrix = np.eye(len(found))
         for pair, one, other in pairs_of(list(found), asked.correlations):
             matrix[one, other] = matrix[other, one] = pair.coefficient
@@ -249,6 +233,8 @@ class _Course:
     stages: list[Learnt] = field(default_factory=list)
     told: list[Told] = field(default_factory=list)
     """Of the last stage."""
+    times: list[Array] = field(default_factory=list)
+    """Of its readings, by the clock of the run, s."""
     points: list[Array] = field(default_factory=list)
     """Of each stage that was ordered."""
     lost: list[int] = field(default_factory=list)
@@ -322,7 +308,7 @@ class _Course:
             if well[0] != 0:
                 raise InputError(f"{name}: the run at the medians of all unknowns failed")
             self.nominal = [values[0] for values in every]
-        self.told, self.unused = [], 0
+        self.told, self.times, self.unused = [], [], 0
         for k, (readings, values) in enumerate(
             zip(self.given.measurement.readings, every, strict=True)
         ):
@@ -331,6 +317,7 @@ class _Course:
             self.unused += int((~there).sum())
             self.told.append(Told(readings.sensor.name, values[:, there], measured[there],
                                   readings.deviation, readings.bias_deviation))  # fmt: skip
+            self.times.append(readings.times[there])
         if not any(len(each.measured) for each in self.told):
             raise InputError(
                 f"{name}: no reading lies within all runs: check clock.offset of the measured data "
@@ -424,7 +411,12 @@ def _write_posterior(course: _Course) -> None:
         "rms_in_deviations": (per_sensor, [fit.rms for fit in last.fits],
                               "readings less what the posterior's mean gives, over their scatter"),
         "readings": (per_sensor, [fit.readings for fit in last.fits], "readings that were used"),
-        "strays": (per_sensor, [fit.strays for fit in last.fits], "readings that were set aside"),
+        "strays": (per_sensor, [len(fit.strays) for fit in last.fits],
+                   "readings that were set aside"),
+        "stray_time": (("stray",), _stray_times(course), "time of a reading that was set aside, by "
+                       "its own clock (s)"),
+        "stray_size": (("stray",), [size for fit in last.fits for size in fit.stray_sizes],
+                       "that reading less what is expected, over the scatter of a reading"),
         "chance": (per_sensor, [fit.chance for fit in last.fits], "probability of so large an rms "
                    "by the scatter of the readings alone"),
         "pattern": (per_sensor, [fit.pattern for fit in last.fits], "how alike successive misfits "
@@ -441,6 +433,7 @@ def _write_posterior(course: _Course) -> None:
     words = {"unknown": names, "other": names, "sensor": sensors,
              "input": [axis.group for axis in unknowns.axes],
              "test": [*last.chances],
+             "stray_sensor": [fit.sensor for fit in last.fits for _ in fit.strays],
              "unknown_units": [axis.units for axis in unknowns.axes]}  # fmt: skip
     own = [k for k, name in enumerate(names) if not name.startswith("clock.")]
     held = np.clip(correlation, -_ALL, _ALL)
@@ -459,19 +452,28 @@ def _write_posterior(course: _Course) -> None:
         file.setncatts(attributes)
         sizes = {"sample": MEMBERS, "unknown": len(names), "other": len(names),
                  "level": len(_LEVELS), "sensor": len(sensors),
-                 "stage": len(course.stages), "test": len(last.chances)}  # fmt: skip
+                 "stage": len(course.stages), "test": len(last.chances),
+                 "stray": len(words["stray_sensor"])}  # fmt: skip
         for name, size in sizes.items():
             file.createDimension(name, size)
         add_inputs(file, table, compression=4)
         file.createVariable("level", "f8", ("level",))[:] = _LEVELS
         for name, texts in words.items():
-            along = name if name in sizes else "unknown"
+            along = "stray" if name == "stray_sensor" else name if name in sizes else "unknown"
             file.createVariable(name, str, (along,))[:] = np.array(texts, dtype=object)
         for name, (dims, values, meaning) in numbers.items():
             array = np.asarray(values)
             made = file.createVariable(name, "i8" if array.dtype.kind == "i" else "f8", dims)
             made[...] = array
             made.setncatts({"long_name": meaning, "units": "1"})
+
+
+def _stray_times(course: _Course) -> list[float]:
+    """When readings were taken that are set aside, by the clock of the measured table, s."""
+    clock = course.given.measurement.file.clock
+    start, rate = (0.0, 0.0) if clock is None else (clock.offset, clock.drift)
+    of = zip(course.stages[-1].fits, course.times, strict=True)
+    return [float((times[k] - start) / (1.0 + rate)) for fit, times in of for k in fit.strays]
 
 
 def _moved(axis: Axis, mean: float, deviation: float, test: str) -> Calibrated:

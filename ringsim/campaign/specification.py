@@ -40,6 +40,7 @@ from ringsim.sampling.table import (
     draw,
     first_inside,
     learnt_from,
+    with_own_places,
 )
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
@@ -90,7 +91,8 @@ class Specification(Model):
     inputs: Annotated[
         dict[str, AnyDistribution], BeforeValidator(lambda table: flat(table, "kind"))
     ] = Field(default_factory=dict)
-    """Distribution by scene path; ``from = "posterior.nc"`` adds what a calibration has found."""
+    """Distribution by scene path; ``from = "posterior.nc"`` adds what a calibration has found.
+    Beside one with ``each_section``, a single place of it may have its own."""
     correlations: list[Correlation] = Field(default_factory=list)
     """Pairs of inputs that depend on each other."""
     design: AnyDesign
@@ -508,6 +510,11 @@ def campaign_of(
             "leave it out, and run the sample of interest alone (ringsim replay --scene prints "
             "its scene)"
         )
+    try:
+        inputs = with_own_places(varied, specification.inputs)
+    except InputError as error:
+        raise InputError(f"{path.name}: {error}") from None
+    specification = specification.model_copy(update={"inputs": inputs})
     own_outputs, has = specification.outputs, holds(varied)
     derived.require_places(own_outputs, axes(varied), path.name)
     wanted = {f"outputs.{n}": one for n, each in own_outputs.items() for one in each.names}

@@ -1,6 +1,7 @@
 """The inputs of all samples: how they lie in netCDF files, how they are correlated."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Self
@@ -14,6 +15,8 @@ from ringsim.cable.records import CABLES
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.distributions import (
     Array,
+    Calibrated,
+    Ranged,
     Values,
     array_of,
     inside,
@@ -247,3 +250,35 @@ def _axes(paths: Sequence[str], name: str) -> list[int]:
         hint = known_or_nearest(name, dict.fromkeys(path.split("[")[0] for path in paths))
         raise InputError(f'correlations.between names "{name}", which is not an input ({hint})')
     return found
+
+
+# Unknowns, that data tell of.
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One unknown number: an axis of standard normal space."""
+
+    name: str
+    """Path or name in a campaign file, with the place where there is one for each."""
+    law: Ranged | Calibrated
+    """Its prior."""
+    units: str
+    group: str
+    """Of what it is one place: the key that it is drawn for, without a place; its name, if its
+    prior is not that of most of them."""
+    input: str
+    """The key that it is drawn for."""
+    shared: tuple[str, ...] = ()
+    """Scene paths that all take it, if not the name alone."""
+
+
+def alike(axes: dict[str, Axis]) -> dict[str, Axis]:
+    """Axes, of which those with priors of their own are no places among others."""
+    priors = {a.name: (a.law.of if isinstance(a.law, Calibrated) else a.law).model_dump_json()
+              for a in axes.values()}  # fmt: skip
+    of = {a.group: Counter(priors[b.name] for b in axes.values() if b.group == a.group)
+          for a in axes.values()}  # fmt: skip
+    usual = {group: each.most_common(1)[0][0] for group, each in of.items()}
+    return {name: a if priors[name] == usual[a.group] else replace(a, group=name)
+            for name, a in axes.items()}  # fmt: skip

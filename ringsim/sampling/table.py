@@ -185,6 +185,29 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
     return [f"[{k + 1}]" for k in range(min(counts.values()))]
 
 
+def with_own_places(base: Scene, inputs: Mapping[str, Distribution]) -> dict[str, Distribution]:
+    """Inputs, where places of one with ``each_section`` have distributions of their own, too.
+
+    Such an input becomes one for each place, in their order, so that correlations between places
+    of two inputs stay.  InputError as ``draw`` raises it.
+    """
+    by_place = dict[str, dict[str, Distribution]]()
+    for name, law in inputs.items():
+        alone = {with_number(base, p): p for p in inputs if p.startswith(f"{name}[")}
+        if not (law.each_section and alone) or law.shared:
+            continue
+        every = [with_number(base, f"{name}{place}") for place in _places(base, name, law)]
+        if alone.keys() & {*every}:
+            bare = law.model_copy(update={"each_section": False})
+            by_place[name] = {alone.get(p, p): inputs.get(alone.get(p, p), bare) for p in every}
+    moved = {path for places in by_place.values() for path in places}
+    found = dict[str, Distribution]()
+    for name, law in inputs.items():
+        if name not in moved:
+            found |= by_place.get(name, {name: law})
+    return found
+
+
 class Learnt(Model):
     """Inputs that a campaign file takes from the result of a calibration."""
 
