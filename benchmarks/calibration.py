@@ -15,9 +15,9 @@ bad       a friction for every pulley of both cables, one of them five times the
           Encoders alone do not see the first pulley of a cable: it slows all sections alike.
           With --ends there is a load cell where each rope ends, too.
 sound     the same without it: how often any pulley is told to stand out.
-own       as bad, but the bad pulley has a prior of its own, as after it was named: how often the 90 %
-          intervals hold its friction, those of the others, and the asynchrony of the ring wound at
-          half the speed, from 64 samples.
+own       as bad, but the bad pulley has a prior of its own, as after it was named: how often the
+          90 % intervals hold its friction, those of the others, and the asynchrony of the ring
+          wound at half the speed, from 64 samples.
 wrong     as coverage with four unknowns, but the truth has dry friction in its V-joints, which the
           model lacks: how often the readings are told not to be explained.
 
