@@ -28,7 +28,7 @@ from ringsim.analysis.residuals import check_sensors, predictions
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, listed_cases, require_no_launcher, start
-from ringsim.campaign.specification import Campaign, Stages, campaign_of
+from ringsim.campaign.specification import Campaign, Stages, campaign_of, refuse_other
 from ringsim.files import parse_toml, read_text, whole, writing
 from ringsim.measured import Measurement, load_measured
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
@@ -85,6 +85,7 @@ def calibration_of(
     InputError if it, the data or a prior is refused.
     """
     table, settings = parse_toml(text, path.name), dict(settings or {})
+    refuse_other(table, path.name, "calibrate")
     # --set reaches the scene's values, and how much is run.
     table |= {name: settings.pop(name) for name in ("runs", "stages") if name in settings}
     own = {name: table.pop(name) for name in Stages.model_fields if name in table}

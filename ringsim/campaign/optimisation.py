@@ -16,12 +16,7 @@ from ringsim import build, extensions
 from ringsim.analysis.design import endings_of, placement
 from ringsim.analysis.engines import differences
 from ringsim.analysis.front import Axis, gains, outputs_of, write_front
-from ringsim.analysis.intervals import (
-    good,
-    numbers,
-    quantities,
-    share_interval,
-)
+from ringsim.analysis.intervals import good, numbers, quantities, share_interval
 from ringsim.analysis.optimum import (
     CHECK,
     DIGITS,
@@ -39,7 +34,14 @@ from ringsim.analysis.verdicts import judge
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, require_no_launcher, start
-from ringsim.campaign.specification import Budget, Campaign, Specification, Variable, campaign_of
+from ringsim.campaign.specification import (
+    Budget,
+    Campaign,
+    Specification,
+    Variable,
+    campaign_of,
+    refuse_other,
+)
 from ringsim.files import parse_toml, read_text, write_text, writing
 from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, holds, supply
@@ -161,6 +163,7 @@ def optimisation_of(
     InputError if it is refused.
     """
     table, settings = parse_toml(text, path.name), dict(settings or {})
+    refuse_other(table, path.name, "optimise")
     sizes = ("designs", "samples", "check", "verdict", "front")
     table |= {name: settings.pop(name) for name in sizes if name in settings}
     for key, cure in _NOT_HERE.items():
@@ -220,8 +223,7 @@ def optimisation_of(
 _NOT_HERE = {
     "design": "an optimisation places its own samples, by samples, check and verdict",
     "requirements": "an optimisation calls them constraints",
-    "stop_when": "each design runs all its samples",
-    "looks": "each design runs all its samples",
+    **dict.fromkeys(("stop_when", "looks"), "each design runs all its samples"),
     "max_failed": "designs whose runs fail are passed over",
     "error_bars_every": "a chosen design may be run with error bars",
 }
@@ -241,12 +243,10 @@ def _require_output(file: str, name: str, scene: Scene) -> None:
         )
 
 
-def _begin(
-    file: str, name: str, law: Variable, present: Campaign, taken: dict[str, str]
-) -> float:  # fmt: skip
+def _begin(file: str, name: str, law: Variable, present: Campaign, used: dict[str, str]) -> float:
     """Where a variable of the present design is between its bounds; InputError if it is not.
 
-    Its paths join those that are ``taken``, with its name.
+    Its paths join those that are ``used``, with its name.
     """
     where, inputs = f"{file}: variables.{name}", present.specification.inputs
     scene, paths = present.scene, law.shared or (name,)
@@ -280,12 +280,12 @@ def _begin(
                 f"{where}: {path} is {show(before)} in the scene, and must be one number there: "
                 "name its places one by one, or set a number under [set]"
             )
-        for others, what in ((drawn, "drawn as input"), (taken, "set by variable")):
+        for others, what in ((drawn, "drawn as input"), (used, "set by variable")):
             outer = next((o for o in others if first_inside(o, [own])), "")
             if other := own if own in others else first_inside(own, others) or outer:
                 by = f"{what} {others[other]}" if others[other] != name else "named before"
                 raise InputError(f"{where}: {path} is also {by}: leave out one of the two")
-        taken[own] = name
+        used[own] = name
         values.append(before)
     if len(set(values)) > 1:
         raise InputError(

@@ -434,6 +434,30 @@ def load_campaign(
     return campaign_of(read_text(path), path, settings, samples)
 
 
+_MARKS = {"measured": "calibrate", "variables": "optimise", "design": "campaign"}
+"""Keys that only one kind of file has, and its verb; a campaign may do without."""
+
+
+def refuse_other(table: Mapping[str, Any], name: str, verb: str) -> None:
+    """Refuse (InputError) the content of a file that another verb takes."""
+    noun = {"campaign": "campaign", "calibrate": "calibration", "optimise": "optimisation"}[verb]
+    if "structure" in table and not {"scene", *_MARKS} & set(table):
+        raise InputError(
+            f"{name}: structure: this is a scene, not a {noun} file: run it with ringsim run, or "
+            f'name it in a {noun} file, as scene = "{name}"'
+        )
+    if "sensors" in table:
+        raise InputError(
+            f"{name}: sensors: this is measured data, no {noun} file: name it in a calibration "
+            f'file, as measured = "{name}"'
+        )
+    if any(key in table for key, other in _MARKS.items() if other == verb != "campaign"):
+        return
+    for key, other in _MARKS.items():
+        if key in table and other != verb:
+            raise InputError(f"{name}: {key}: this is no {noun} file: run it with ringsim {other}")
+
+
 def campaign_of(
     text: str, path: Path, settings: Mapping[str, Any] | None = None, samples: int | None = None,
     scene: Scene | None = None,
@@ -446,16 +470,7 @@ def campaign_of(
     the text names.
     """
     table = parse_toml(text, path.name)
-    if "structure" in table and not {"scene", "design"} & set(table):
-        raise InputError(
-            f"{path.name}: structure: this is a scene, not a campaign file: run it with ringsim "
-            f'run, or name it in a campaign file, as scene = "{path.name}"'
-        )
-    for key, verb in {"measured": "calibrate", "variables": "optimise"}.items():
-        if key in table:
-            raise InputError(
-                f"{path.name}: {key}: this is no campaign file: run it with ringsim {verb}"
-            )
+    refuse_other(table, path.name, "campaign")
     if samples is not None and isinstance(design := table.get("design"), dict):
         kind = kinds_of(Design).get(str(design.get("kind")))
         if kind is not None and "samples" not in kind.model_fields:

@@ -227,6 +227,11 @@ def learnt_from(
     """
     import netCDF4
 
+    if not file.exists():
+        raise InputError(
+            f"inputs.from: there is no file {file}: run the calibration first that makes it "
+            "(ringsim calibrate), or correct the name"
+        )
     require_regular(file)
     try:
         with netCDF4.Dataset(file) as data:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 import shlex
@@ -10,16 +11,21 @@ from pathlib import Path
 
 import preloaded
 import pytest
+import tomli_w
 from click.testing import CliRunner
 from loops import for_each
 
 from pages import PAGES, ROOT, blocks, calls
+from ringsim.campaign.specification import Budget, Specification, Stages, campaign_of
 from ringsim.cli import VERBS, cli, command_of
+from ringsim.measured import Measured
 from ringsim.plots import figures
-from ringsim.scene import load_scene
+from ringsim.refusal import InputError
+from ringsim.scene import Scene, load_scene
 
 WISHES = (ROOT / "docs" / "i_want_to.md").read_text(encoding="utf-8")
 EVIDENCE = [page for page in PAGES if "evidence" in page.parts and page.stem != "index"]
+SCENES = sorted(path.stem for path in (ROOT / "ringsim" / "scenes").glob("*.toml"))
 TUTORIAL = ROOT / "docs" / "tutorial.md"
 CALLS = [
     pytest.param(call, id=f"{page.relative_to(ROOT)}: {' '.join(call)[:60]}")
@@ -42,6 +48,33 @@ def test_commands_and_their_options_exist(call: list[str]) -> None:
     command = command_of(verb)
     arguments = [each.strip("[]").split("|")[0] for each in arguments if each != "|"]
     command.make_context(verb, arguments).close()
+
+
+def test_listings_in_toml_are_files_that_are_taken() -> None:
+    """All have keys of one kind of file; what belongs to a campaign makes one, with some scene."""
+    kinds = [{*Specification.model_fields, *more.model_fields} for more in (Stages, Budget)]
+    kinds += [{*Scene.model_fields}, {*Measured.model_fields}]
+    count = 0
+    for page in PAGES:
+        for text in blocks(page, "toml"):
+            table, count = tomllib.loads(text), count + 1
+            assert any(table.keys() <= known for known in kinds), (page, table.keys())
+            if not table.keys() <= Specification.model_fields.keys() or "imports" in table:
+                continue
+            whole = {"name": "x", "design": {"kind": "random", "samples": 32}} | table
+            stops = table.get("stop_when", [])
+            for each in stops if isinstance(stops, list) else [stops]:
+                if "requirement" in each and "requirements" not in table:
+                    bound = {"max": 12.0, "probability": 0.9, "confidence": 0.9}
+                    whole |= {"requirements": {each["requirement"]: bound}}
+            for scene in [table["scene"]] if "scene" in table else SCENES:
+                with contextlib.suppress(InputError):
+                    made = campaign_of(tomli_w.dumps(whole | {"scene": scene}), page)
+                    made.draw()
+                    break
+            else:
+                raise AssertionError(f"{page}: no scene takes {text}")
+    assert count >= 30
 
 
 def test_what_wishes_lead_to_exists() -> None:

@@ -18,6 +18,7 @@ from click.testing import CliRunner
 from loops import for_each
 
 import ringsim
+from ringsim import simulation
 from ringsim.analysis.posterior import calibration_tables
 from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
 from ringsim.cli import cli
@@ -27,6 +28,7 @@ from ringsim.refusal import InputError
 from ringsim.sampling.distributions import Calibrated, Lognormal, Truncated, Uniform
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
+from ringsim.tables import counted
 
 SETTINGS = {
     "structure.sections": 3, "structure.opening_angle": 100.0, "boom": "none",
@@ -291,6 +293,93 @@ def test_friction_that_the_model_does_not_know_is_told(tmp_path):
     assert "NOT EXPLAINED" in done.output
 
 
+@pytest.mark.parametrize("which", ["rods.poisson_ratio", "cables.upper.winch.winding.speed"])
+def test_runs_that_fail_are_counted_and_shift_nothing(which, test_files, tmp_path, monkeypatch):
+    """By what no angle tells, or by what is looked for, the truth among those that do not fail."""
+    engine = simulation.run_frame
+    limit = {"rods.poisson_ratio": 0.317, "cables.upper.winch.winding.speed": 0.129}[which]
+    kept = {"rods.poisson_ratio": 0.81, "cables.upper.winch.winding.speed": 0.82}[which]
+
+    def brittle(ring, *more):
+        value = ring.rods.poisson_ratio
+        if which != "rods.poisson_ratio":
+            value = ring.cables.upper.winch.winding.speed
+        if np.max(value) > limit:
+            raise RuntimeError("it broke")
+        return engine(ring, *more)
+
+    monkeypatch.setattr(simulation, "run_frame", brittle)
+    posterior = ringsim.Calibration.read(test_files).run(workers=0, out=tmp_path / "out")
+    lost = posterior["lost"].values
+    assert lost[0] == pytest.approx(16 * (1.0 - kept), abs=3)
+    assert lost[0] > 0
+    for name, value in TRUTH.items():
+        low, _, high = posterior["posterior_quantile"].sel(unknown=name).values
+        wide = high - low
+        assert low - 0.3 * wide < value < high + 0.3 * wide, name
+        assert posterior["learnt"].sel(unknown=name) < 0.3
+    _, verdict = calibration_tables(posterior)
+    assert f"{counted(int(lost.sum()), 'run')} of 48 failed and told nothing" in verdict.notes
+    with xr.open_dataset(tmp_path / "out" / "stage-1" / "campaign.nc") as stage:
+        assert int((stage["status"] != 0).sum()) == lost[0]
+
+
+def test_too_many_failed_runs_end_it_in_one_line(test_files, tmp_path, monkeypatch):
+    monkeypatch.setattr(simulation, "run_frame", lambda *_: 1 / 0)
+    with pytest.raises(InputError, match="stage-1: 0 of 16 runs ended well, and 3 unknowns take 8"):
+        ringsim.Calibration.read(test_files).run(workers=0, out=tmp_path / "out")
+    assert not (tmp_path / "out" / POSTERIOR).exists()
+
+
+def test_gross_errors_are_named_by_sensor_and_time(test_files, found, tmp_path):
+    for name in ("stand.toml", "stand.csv", "ring.toml", "cal.toml"):
+        shutil.copy(test_files.parent / name, tmp_path)
+    rows = [row.split(",") for row in (tmp_path / "stand.csv").read_text().splitlines()]
+    rows[3][1] = f"{float(rows[3][1]) + 4.0:.6f}"  # 40 sigma
+    rows[9][1] = f"{float(rows[9][1]) - 2.0:.6f}"
+    (tmp_path / "stand.csv").write_text("\n".join(map(",".join, rows)))
+    stand = tmp_path / "stand.toml"  # the time is told as the table has it
+    stand.write_text(stand.read_text().replace('column = "t" }', 'column = "t", offset = 0.1 }'))
+    rows = [[rows[0][0], *rows[0][1:]], *([f"{float(r[0]) - 0.1:.6f}", *r[1:]] for r in rows[1:])]
+    (tmp_path / "stand.csv").write_text("\n".join(map(",".join, rows)))
+    posterior = ringsim.Calibration.read(tmp_path / "cal.toml").run(workers=0, out=tmp_path / "o")
+    assert posterior["stray_sensor"].values.tolist() == ["opening_angle upper 1"] * 2
+    np.testing.assert_allclose(posterior["stray_time"], [0.2, 0.8], atol=1e-6)
+    np.testing.assert_allclose(posterior["stray_size"], [40.0, -20.0], atol=4.0)
+    clean = found[0]
+    for name in TRUTH:  # but for two readings of 42 the same
+        now, was = (each["posterior_quantile"].sel(unknown=name).values
+                    for each in (posterior, clean))  # fmt: skip
+        assert abs(now[1] - was[1]) < 0.25 * (was[2] - was[0])
+    _, verdict = calibration_tables(posterior)
+    (line,) = (note for note in verdict.notes if note.startswith("set aside"))
+    assert "opening_angle upper 1 at 0.2 s (+" in line
+    assert "opening_angle upper 1 at 0.8 s (-" in line
+
+
+@pytest.mark.slow
+def test_pulley_with_a_prior_of_its_own_is_measured(tmp_path):
+    """Five times the friction of the others: named, and then found with its own prior."""
+    pulleys = "cables.upper.friction.coefficient"
+    write_test(tmp_path, {f"{pulleys}[3]": 2e-3}, deviation=0.02)
+    law = {"kind": "lognormal", "mean": 4e-4, "standard_deviation": 8e-5, "each_section": True}
+    ring = scene().with_values({pulleys: 4e-4})
+    own = {"kind": "uniform", "low": 0.0, "high": 4e-3}
+    tables = {}
+    for name, more in {"one": {}, "two": {f"{pulleys}[3]": own}}.items():
+        file = write_file(tmp_path, 72, 3, inputs=more | {pulleys: law})
+        (tmp_path / "ring.toml").write_text(ring.to_toml())
+        tables[name] = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / name)
+    names = [f"{pulleys}[{k}]" for k in range(1, 9)]
+    assert tables["two"]["unknown"].values.tolist() == names
+    assert tables["one"]["unknown"].values.tolist() == names
+    low, _, high = tables["two"]["posterior_quantile"].sel(unknown=names[2]).values
+    assert low - 0.3 * (high - low) < 2e-3 < high + 0.3 * (high - low)
+    judged = np.isfinite(tables["two"]["contrast"].values)
+    assert judged.tolist() == [True, True, False, True, True, True, True, True]
+    assert not (tables["two"]["group"] > 0).any()
+
+
 # What stands on it.
 
 
@@ -372,6 +461,7 @@ def test_plan_of_sensors_foretells_what_a_test_tells(test_files, found, tmp_path
         ),
         ("clock = { offset = 3 }", PRIORS, "clock.offset"),
         ("mesured = 1", PRIORS, "mesured"),
+        ("sensors = 1", PRIORS, "sensors: this is measured data, no calibration file"),
         ("error_bars_every = 4", PRIORS, "error_bars_every: leave it out"),
         ("max_failed = 2", PRIORS, "max_failed: failed runs are counted"),
         (
@@ -388,6 +478,25 @@ def test_what_is_refused(more, inputs, words, tmp_path):
     assert done.exit_code == 2, done.output
     assert words in done.output
     assert not (tmp_path / "out").exists()
+
+
+@for_each(
+    "file, words",
+    [
+        ("nonsync_quick.toml", "design: this is no calibration file: run it with ringsim campaign"),
+        ("stand/measured.toml", "sensors: this is measured data, no calibration file: name it in a "
+         'calibration file, as measured = "measured.toml"'),
+    ],
+)  # fmt: skip
+def test_files_of_other_verbs_are_told(file, words):
+    done = CliRunner().invoke(cli, ["calibrate", str(STAND.parent / file)])
+    assert done.exit_code == 2
+    assert words in done.output
+    optimised = CliRunner().invoke(cli, ["optimise", str(STAND / "friction.toml")])
+    assert optimised.exit_code == 2
+    assert "measured: this is no optimisation file: run it with ringsim calibrate" in (
+        optimised.output
+    )
 
 
 def test_too_few_runs_and_readings_out_of_time_are_refused(tmp_path):
@@ -409,7 +518,10 @@ def test_too_few_runs_and_readings_out_of_time_are_refused(tmp_path):
 @for_each(
     "said, words",
     [
-        ('from = "none.nc"', "none.nc cannot be read"),
+        (
+            'from = "none.nc"',
+            "none.nc: run the calibration first that makes it",
+        ),
         ('from = { file = "posterior.nc", without = ["x"] }', "x is no unknown of posterior.nc"),
         ('from = { fil = "posterior.nc" }', "fil"),
         (
