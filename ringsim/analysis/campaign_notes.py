@@ -124,27 +124,36 @@ _PLACES = re.compile(r"\b(upper|lower) \d+(?:, (?:(?:upper|lower) )?\d+)*(?: and
 
 def remark_lines(campaign: xr.Dataset) -> list[str]:
     """Remarks that runs make on their own numbers behind their reason, alike but for numbers and
-    places: how many samples make each, with the first one's words.  What may be off ``off_note``
-    tells, and ``late_line`` drive margins of winches that start late.
+    places: how many samples make each, be it as their reason, with the first one's words.  What may
+    be off ``off_note`` tells, and ``late_line`` drive margins of winches that start late.
     """
     if "reason" not in campaign:
         return []
     found: dict[str, list[tuple[int, str]]] = {}
+    first: dict[str, list[tuple[int, str]]] = {}
     held, reasons = good(campaign), campaign["reason"].to_numpy()
     for sample in np.flatnonzero(held).tolist():
-        for remark in str(reasons[sample]).split("; ")[1:]:
+        reason, *remarks = str(reasons[sample]).split("; ")
+        first.setdefault(_kind(reason), []).append((sample, reason))
+        for remark in remarks:
             if may_be_off(f"; {remark}")[0] or remark.startswith(_LATE):
                 continue
             remark = remark.replace("start 1: ", "first attempt, not used: ", 1)
             if remark.count(")") > remark.count("("):  # which the words before it have opened
                 remark = remark.removesuffix(")")
-            kind = _NUMBER.sub("#", _PLACES.sub("#", remark))
-            found.setdefault(kind, []).append((sample, remark))
+            found.setdefault(_kind(remark), []).append((sample, remark))
+    found = {kind: sorted(own + first.get(kind, [])) for kind, own in found.items()}
     every = int(held.sum())
     return [
         f"in {_of(len(own), every)}, for example in sample {own[0][0]}: {own[0][1]}"
         for own in sorted(found.values(), key=len, reverse=True)
     ]
+
+
+def _kind(remark: str) -> str:
+    """What is alike of remarks that differ in numbers and places."""
+    alike = _NUMBER.sub("#", _PLACES.sub("#", remark))
+    return alike.replace(" the # latches that were met", " # latches")
 
 
 _LATE = "the least drive margin is that of "

@@ -395,8 +395,7 @@ def settings(both: Both) -> dict[str, Any]:
         name for name in dict.fromkeys([*asked[0], *asked[1]])
         if asked[0].get(name) != asked[1].get(name)
     ]  # fmt: skip
-    names = np.array(other + apart, dtype=object)
-    found: dict[str, Any] = {"setting": ("setting", names)}
+    found: dict[str, Any] = {"setting": ("setting", np.array(other + apart, dtype=object))}
     fixed = [{f"input {p}": f"{show(v)}, not drawn" for p, v in each.items()} for each in scenes]
     known = [given | own for own, given in zip(asked, fixed, strict=True)]
     words = [where_apart(*(each.get(name, "none") for each in known)) for name in other]
@@ -408,14 +407,16 @@ def settings(both: Both) -> dict[str, Any]:
     return found
 
 
-_WHOLE = 10**6
-"""Characters of a law that is compared: no less than all."""
-
-
 def _asked(campaign: xr.Dataset) -> dict[str, str]:
     """Distributions, outputs by expressions and requirements of a campaign in words, by name."""
+    whole = 10**6  # characters of a law: no less than all is compared
     drawn = (campaign[name] for name in inputs(campaign))
-    laws = {f"input {called(each)}": law_text(distribution_of(each), _WHOLE) for each in drawn}
+    laws = {f"input {called(each)}": law_text(distribution_of(each), whole) for each in drawn}
+    for path, name in by_path(campaign).items():
+        law, own = distribution_of(campaign[name]), called(campaign[name])
+        if path != own:  # follows an input, or shares its values
+            words = law_text(law, whole) if law.get("kind") == "function" else f"that of {own}"
+            laws[f"input {path}"] = words
     wanted = required_by(campaign.attrs)
     laws |= {f"output {name}": each.of for name, each in known_from(campaign.attrs).items()}
     return laws | {

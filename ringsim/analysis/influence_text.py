@@ -263,7 +263,8 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
     if "mean_absolute_effect" in analysis:
         return [
             "mu*: mean absolute change of the output, in its unit, when the inputs of a group "
-            "move by half of their range; sigma: standard deviation of that change"
+            "move across half of their levels (of 4, two thirds of a uniform range); sigma: "
+            "standard deviation of that change"
         ]
     if "total_index" in analysis:
         none = analysis["total_index_interval"].isnull().all()
@@ -346,6 +347,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
     rows, quiet, doubtful, more, alone = [], [], list[str](), list[str](), list[str]()
+    open_ = list[str]()
     separated, flat = _separated_groups(analysis), _flat(analysis)
     for output, names, others in mattering(analysis):
         if is_moment(output) or output in flat:
@@ -361,7 +363,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
             sure = analysis["input"].values[_standing(analysis, output)]
             alone += [f"{output} by {n}" for n in names[:_MOST_IN_SHORT] if n not in sure]
         if not names and output not in separated:
-            quiet.append(output)
+            (open_ if _undecided(analysis, measure, output) else quiet).append(output)
     notes = measure_notes(analysis)
     if any(row[1].startswith(DIFFERENCE) for row in rows):
         notes.append("difference: how far the planes' inputs are apart, whichever is the larger")
@@ -399,11 +401,21 @@ def what_matters(analysis: xr.Dataset) -> Table:
         told = ", ".join(near)
         why = "no sample is farther from the mean than the numerical error"
         notes.append(f"not told, because {why}: {told}")
+    if open_:
+        notes.append(f"not known, as few samples decide it: what matters for {', '.join(open_)}")
     if quiet:
         notes.append(f"no significant input for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *RANKS.values())
     return marked(Table(head, rows, notes, left=2), analysis, 1)
+
+
+def _undecided(analysis: xr.Dataset, measure: str | None, output: str) -> bool:
+    """Whether an interval of its indices is longer than all of its variance."""
+    if measure != "total_index" or output not in analysis["output"]:
+        return False
+    ends = _index_ends(analysis.sel(output=output), measure)
+    return bool((ends[:, 1] - ends[:, 0] > 1.0).any())
 
 
 def _flat(analysis: xr.Dataset) -> list[str]:

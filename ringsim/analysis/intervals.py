@@ -43,7 +43,9 @@ samples may be of two values, whose moments tell of no error.  Uniform values ha
 
 
 def spread(values: Array, axis: int = -1) -> Array:
-    """Standard deviation with n - 1 in the denominator."""
+    """Standard deviation with n - 1 in the denominator; NaN of a single value."""
+    if values.shape[axis] < 2:
+        return np.full(np.delete(values.shape, axis), np.nan)
     return np.asarray(np.std(values, axis=axis, ddof=1))
 
 

@@ -471,9 +471,14 @@ def _standing_out(found: xr.Dataset) -> list[str]:
                            f"no place stands out; the farthest is {called[best]} "
                            f"({sigma[best]:+.1f} sigma)")
             + f" (false alarms: at most {FALSE_ALARM:g} if all are as the prior says)"
-            + (": the prior of the others holds its value back: give it one of its own beside "
-               f"theirs, as {name}[k], and calibrate again" if parts else "")
         )  # fmt: skip
+        if parts:
+            suspect = called[int(np.flatnonzero(own["group"] > 0)[0])]
+            lines.append(
+                "the prior of the others holds the value of such a place back: give each that is "
+                f"named a wide one of its own beside theirs, '{name}{suspect}' = ..., and "
+                "calibrate again"
+            )
     return lines
 
 

@@ -96,7 +96,9 @@ def unusual(
             values, own = columns.values[:, k], columns.input[k]
             variable = both[own][0] if own in both else variables[own]
             value = values[place] if larger else -values[place]
-            out = float(np.mean((values if larger else -values) >= value))
+            beside = values if larger else -values
+            # Half of those with its own value, as where two values share all samples.
+            out = float(0.5 * (np.mean(beside > value) + np.mean(beside >= value)))
             if own in named or out > (1.0 if _has_words(variable) else _SIDE):
                 continue
             named.add(own)

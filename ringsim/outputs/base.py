@@ -330,7 +330,8 @@ def jerked(run: Run) -> str:
     )
     met = run.history.rates
     asked = np.broadcast_to(np.asarray(latch.min_rate, dtype=float), locks.shape)
-    driven, unsure = ahead.any(axis=(-2, -1)), np.nan_to_num(run.history.unsure)
+    jerks = jolted(run.angles.times, locks, run.slowest_period)  # as for the rates themselves
+    driven, unsure = ahead.any(axis=(-2, -1)), np.nan_to_num(uncertain(run.history, jerks))
     near = may_decide(met, unsure, asked, driven=driven)
     late = np.argwhere(near).tolist()
     if not late:

@@ -263,12 +263,14 @@ def missed(values: Values, planes: Sequence[str]) -> str:
     """Which latches did not catch though their joints came to them, in words; empty if none."""
     if "latched" not in values:
         return ""
-    open_ = np.argwhere(np.isfinite(values["lock_time"]) & (values["latched"] == 0)).tolist()
+    met = np.isfinite(values["lock_time"])
+    open_ = np.argwhere(met & (values["latched"] == 0)).tolist()
     if not open_:
         return ""
     names = [f"{planes[plane]} {section + 1}" for plane, section in open_]
     more = f" and {len(names) - 6} more" if len(names) > 6 else ""
-    count = f"{len(names)} of {values['latched'].size} latches did not catch"
+    of = f"{met.size} latches" if met.all() else f"the {met.sum()} latches that were met"
+    count = f"{len(names)} of {of} did not catch"
     return f"{count}: {', '.join(names[:6])}{more}"
 
 

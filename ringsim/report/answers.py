@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsim.analysis import campaign_notes as notes
 from ringsim.analysis.intervals import good, numbers, quantities
@@ -114,6 +115,11 @@ def evidence_of(of: Of, name: str) -> str:
     used, lost, absent, _ = of.analysis[f"{name}_samples"].values
     cell, unit = cells_of(of.errors, name), unit_of(of.analysis, name)[1]
     words, campaign = [f"{used} of {used + lost + absent} samples"], of.campaign
+    if cell.get("largest bar", "-") == "-" and (bars := bars_in(campaign, name)).any():
+        # A design without means has no table of errors.
+        factor, worst = unit_of(of.analysis, name)[0], int(np.argmax(bars))
+        cell = cell | {"largest bar": f"{number_text(factor * bars[worst], 2)} (sample {worst})",
+                       "samples with bars": str(np.count_nonzero(bars))}  # fmt: skip
     if OUTCOME in campaign and len(campaign[OUTCOME]) == used + lost + absent:
         valued = good(campaign) & np.isfinite(numbers(campaign, name))
         short = int((valued & ~np.isin(campaign[OUTCOME], [-1, Fate.NONE, *GOALS])).sum())
@@ -127,6 +133,11 @@ def evidence_of(of: Of, name: str) -> str:
             of_all = "largest of " * (cell[count] != "1") + counted(int(cell[count]), told)
             words.append(f"{of_all}: {with_unit(number, unit)} {where}".rstrip())
     return "; ".join(words)
+
+
+def bars_in(campaign: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """The error bar of an output in each sample that holds; 0 where there is none."""
+    return np.nan_to_num(np.where(good(campaign), numbers(campaign, f"{name}_error"), 0.0))
 
 
 def verdicts(of: Of, name: str = "") -> Answer:

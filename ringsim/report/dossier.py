@@ -33,6 +33,7 @@ from ringsim.report.answers import (
     Answer,
     Ask,
     Of,
+    bars_in,
     cells_of,
     drawn_lines,
     evidence_of,
@@ -452,7 +453,8 @@ def _uncertainty(of: Of) -> Answer:
         if source and not is_moment(name):
             bare = cell["numerical (error bars)"] == "-"
             largest.setdefault(_UNMEASURED if bare else source, []).append(name)
-    found.lacks |= {} if largest else {"numerical errors": "error_bars_every"}
+    if not largest and not any(bars_in(of.campaign, n).any() for n in quantities()):
+        found.lacks["numerical errors"] = "error_bars_every"
     for source, names in largest.items():
         many = source in (SOURCES[0], _UNMEASURED)
         told = counted(len(names), "output") if many else ", ".join(names)

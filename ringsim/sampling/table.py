@@ -196,10 +196,12 @@ def with_own_places(base: Scene, inputs: Mapping[str, Distribution]) -> dict[str
         alone = {with_number(base, p): p for p in inputs if p.startswith(f"{name}[")}
         if not (law.each_section and alone) or law.shared:
             continue
-        every = [with_number(base, f"{name}{place}") for place in _places(base, name, law)]
+        every = [f"{name}{place}" for place in _places(base, name, law)]
         if alone.keys() & {*every}:
             bare = law.model_copy(update={"each_section": False})
-            by_place[name] = {alone.get(p, p): inputs.get(alone.get(p, p), bare) for p in every}
+            called = [f'{name}["{each}"]' for each in pulleys_at(base, name)] or every
+            own = [alone.get(p, word) for p, word in zip(every, called, strict=True)]
+            by_place[name] = {path: inputs.get(path, bare) for path in own}
     moved = {path for places in by_place.values() for path in places}
     found = dict[str, Distribution]()
     for name, law in inputs.items():

@@ -384,8 +384,12 @@ def by_input(campaign: xr.Dataset) -> Figure:
         else ""
     )
     if others > 0:
-        left = f"{counted(others, 'input')} whose rank correlation with the number is smaller"
-        note += f" Not drawn: {left}."
+        which = "has" if others == 1 else "have"
+        without = " (it counts as least where there is none)" if lost else ""
+        note += (
+            f" Not drawn: {counted(others, 'input')}, which of all that are numbers {which} the "
+            f"smallest rank correlation with this one{without}."
+        )
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
     # asynchrony_max, deployment_time
     judged = f"{name.removesuffix('_max').replace('_', ' ')} and outcome by input"
