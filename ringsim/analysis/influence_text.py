@@ -346,8 +346,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
     measure = _measure(analysis)
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
-    rows, quiet, doubtful, more, alone = [], [], list[str](), list[str](), list[str]()
-    open_ = list[str]()
+    rows, quiet, doubtful = list[tuple[str, ...]](), list[str](), list[str]()
+    more, alone, open_ = list[str](), list[str](), list[str]()
     separated, flat = _separated_groups(analysis), _flat(analysis)
     for output, names, others in mattering(analysis):
         if is_moment(output) or output in flat:

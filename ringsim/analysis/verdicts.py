@@ -341,8 +341,8 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         told.append(
             f"{name}: in {counted(close, 'sample')} it is closer to the limit than its numerical "
             f"error (the sample's own error bar, or without one at most {error}, the root mean "
-            "square of those that ended alike, of all if too few have one): smaller steps, or more "
-            "elements, settle it"
+            "square of those that ended alike, of all if that is more and fewer than three have "
+            "one): smaller steps, or more elements, settle it"
         )
     if others and name in (OUTCOME, LATCHED):
         told.append(

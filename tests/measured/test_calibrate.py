@@ -370,10 +370,11 @@ def test_pulley_with_a_prior_of_its_own_is_measured(tmp_path):
         file = write_file(tmp_path, 72, 3, inputs=more | {pulleys: law})
         (tmp_path / "ring.toml").write_text(ring.to_toml())
         tables[name] = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / name)
-    names = [f"{pulleys}[{k}]" for k in range(1, 9)]
-    assert tables["two"]["unknown"].values.tolist() == names
-    assert tables["one"]["unknown"].values.tolist() == names
-    low, _, high = tables["two"]["posterior_quantile"].sel(unknown=names[2]).values
+    names = tables["one"]["unknown"].values.tolist()
+    assert [pulleys in name for name in names] == [True] * 8
+    # By its number or by its name, it stands at its place.
+    assert tables["two"]["unknown"].values.tolist() == [*names[:2], f"{pulleys}[3]", *names[3:]]
+    low, _, high = tables["two"]["posterior_quantile"][2].values
     assert low - 0.3 * (high - low) < 2e-3 < high + 0.3 * (high - low)
     judged = np.isfinite(tables["two"]["contrast"].values)
     assert judged.tolist() == [True, True, False, True, True, True, True, True]
@@ -593,6 +594,34 @@ def test_shipped_test_is_explained_and_holds_its_truth(tmp_path):
         assert low < value < high, name
     assert float(posterior["chance_of_all"].min()) > 1e-3
     assert float(posterior["learnt"].sel(unknown="joints.vjoint.viscous")) < 0.1
+    # What the page shows is what is printed.
+    page = (STAND.parents[1] / "docs" / "guide" / "calibrate.md").read_text(encoding="utf-8")
+    shown = page.partition("```text\nunknown ")[2].partition("```")[0].splitlines()
+    printed = "\n".join(line for each in calibration_tables(posterior) for line in each.lines())
+    for line in ("unknown " + shown[0], *shown[1:]):
+        assert line == "..." or line in printed, line
+
+
+@pytest.mark.slow
+def test_shipped_test_with_a_bad_pulley_names_it(tmp_path):
+    """Also the page's: by half of the runs, in two stages."""
+    file = STAND / "pulleys" / "pulleys.toml"
+    posterior = ringsim.Calibration.read(file, {"runs": 160, "stages": 2}).run(
+        2, out=tmp_path / "o"
+    )
+    named = posterior["unknown"].values[posterior["group"].values > 0].tolist()
+    truth = tomllib.loads((STAND / "pulleys" / "truth.toml").read_text(encoding="utf-8"))["values"]
+    name = "cables.lower.friction.coefficient"
+    assert named == [f'{name}["section 3 V"]']
+    unknowns = [each for each in posterior["unknown"].values.tolist() if each.startswith(name)]
+    assert unknowns.index(named[0]) == int(np.argmax(truth[name]))
+    told = "\n".join(note for each in calibration_tables(posterior) for note in each.notes)
+    assert 'stands out from the other places: ["section 3 V"] (+5' in told
+    assert f"""theirs, '{named[0]}' = ..., and calibrate again""" in told
+    own = calibration_of((STAND / "pulleys" / "suspect.toml").read_text(encoding="utf-8"),
+                         STAND / "pulleys" / "suspect.toml")  # fmt: skip
+    laws = own.campaign.specification.inputs
+    assert [path for path, law in laws.items() if isinstance(law, Uniform)] == named
 
 
 def test_shipped_test_can_be_read():
