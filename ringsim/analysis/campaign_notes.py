@@ -198,7 +198,7 @@ def late_line(campaign: xr.Dataset) -> str:
     k = int(np.argmin(np.where(held, later, np.inf)))
     angle = numbers(campaign, "least_drive_margin_started_angle")[k]
     where = f"sample {int(campaign['sample'][k])}, at {angle:.4g} deg"
-    return f"{line}; from then on all have at least {later[k]:.4g} ({where})"
+    return f"{line}; counted from then on the least of all samples is {later[k]:.4g} ({where})"
 
 
 _STARTED = "_started"

@@ -255,7 +255,7 @@ def short_of(found: xr.Dataset) -> list[str]:
     most, short = bound_text(high, 2, upper=True), int((each == 0.0).sum())
     words = [f"below {most}: {short} of {len(each)} replicates did not reach the event"]
     if short < len(each):
-        words.append(f"their mean is {each.mean():.2g}")
+        words.append(f"the mean of all {len(each)} estimates is {each.mean():.2g}")
     return [
         *words,
         f"the bound is the probability of {reached.attrs['event']}, which all replicates "
@@ -312,7 +312,7 @@ def tail_table(analysis: xr.Dataset) -> Table:
             ("by each replicate", ", ".join(each)),
         ]
     rows += [
-        ("levels", f"{levels} at most, in {replicates} replicates"),
+        ("levels", f"{levels} at most with the first one, in {replicates} replicates"),
         ("runs", f"{runs}, {lost} failed and counted as outside the event"),
     ]
     if checked := int(analysis["tail_checked"]):

@@ -383,7 +383,8 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
             one["probability"], chosen = np.nan, True
             near = one["samples_close"]
-            but = f", and {near} are closer to the limit than the numerical error" * bool(near)
+            but = (f"; {near}, on either side of the limit, are closer to it than the numerical "
+                   "error") * bool(near)  # fmt: skip
             notes.append(f"{name}: {bad} of {used} samples violate it{but}")
         rows.append((
             one["requirement_text"], verdict_text(one), f"{one['probability_required']:g}",
@@ -418,9 +419,10 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         if short := one.get("samples_short"):
             held = one["samples_used"] - one["samples_violating"]
             hint = "" if OUTCOME in analysis["requirement"] else _HINT
+            goal = "all V-joints had come to 180 deg" if name in _FINAL else "it was deployed"
             notes.append(
-                f"{name}: {short} of the {held} samples that meet it ended before the antenna was "
-                f"deployed, and meet it only as far as they came{hint}"
+                f"{name}: {short} of the {held} samples that meet it ended before {goal}, and meet "
+                f"it only as far as they came{hint}"
             )
         # More samples alone would not settle what smaller steps have to.
         if one["verdict_may_change"] or verdict == Verdict.NOT_YET_SHOWN:

@@ -2,6 +2,7 @@
 
 import shlex
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -88,7 +89,7 @@ def unusual(
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
     for place, sides in zip(places, separating or [{}] * len(places), strict=True):
-        told, named = list[str](), set[str]()
+        told, named = _chosen(campaign, place), set[str]()
         for name, larger in sides.items():
             if name not in columns.names or len(told) == _MOST:
                 continue
@@ -118,6 +119,23 @@ def unusual(
         told += [each.words for each in sorted(odd, key=lambda each: (not each.before, each.share))]
         found.append("; ".join(told[:_MOST]) or "nothing unusual")
     return found
+
+
+def _chosen(campaign: xr.Dataset, place: int) -> list[str]:
+    """Of a list of cases, its labels of this one, and what most of the others have otherwise."""
+    if placement(campaign).kind != "list":
+        return []
+    labels = [
+        v for v in campaign.variables.values()
+        if v.attrs.get("role") == "label" and v.dims == ("sample",) and v.dtype.kind in "OU"
+    ]  # fmt: skip
+    told = [str(each.values[place]) for each in labels]
+    for variable in (campaign[name] for name in inputs(campaign)):
+        values = [_value(each, _units(variable)) for each in variable.to_numpy().tolist()]
+        most, count = Counter(values).most_common(1)[0]
+        if values[place] != most and 2 * count > len(values):
+            told.append(f"{called(variable)} = {values[place]} (most: {most})")
+    return told
 
 
 def one_at_a_time(campaign: xr.Dataset) -> bool:

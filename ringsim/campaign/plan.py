@@ -204,6 +204,8 @@ def _predicted(
         per_cost = result.seconds / cost[trial]
         size = float(len(result.body) + len(result.header()))
         basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
+        if result.status != Status.OK:
+            basis += "; runs that end well may take far longer than this one"
     each = per_cost * cost[todo]
     barred = np.zeros(len(todo), dtype=bool)
     for column in table.columns:

@@ -272,8 +272,9 @@ def changed(new: Arrays, old: Arrays) -> list[str]:
         apart = before > 0.0 and np.isfinite(after) and before != after
         more = f" ({100.0 * (after / before - 1.0):+.2g} %)" if apart else ""
         bars = [float(each.get(f"{name}_error", np.nan)) for each in (old, new)]
-        factor, unit = readable(variable.units, max(abs(before), abs(after)))
+        factor, unit = readable(variable.units, np.nanmax(np.abs([before, after, 0.0])))
         values = " -> ".join(
+            "none" if np.isnan(value) else
             f"{factor * value:.5g}" + f" +- {factor * bar:.2g}" * bool(np.isfinite(bar))
             + f" {unit_text(unit)}" * (unit_text(unit) != "")
             for value, bar in zip((before, after), bars, strict=True)

@@ -21,9 +21,15 @@ from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quanti
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.residuals import residual_table, residuals
 from ringsim.analysis.study import SOURCES, analyse
-from ringsim.analysis.study_text import error_tables, head_lines, statistics_table
+from ringsim.analysis.study_text import error_tables, head_lines, statistics_table, unit_of
 from ringsim.analysis.tails import tail_table
-from ringsim.analysis.worst import command, margin_table, worst_tables
+from ringsim.analysis.worst import (
+    command,
+    margin_table,
+    one_at_a_time,
+    other_than_base,
+    worst_tables,
+)
 from ringsim.files import write_text
 from ringsim.measured import Measurement
 from ringsim.outputs.family import Array
@@ -43,7 +49,7 @@ from ringsim.report.answers import (
 )
 from ringsim.report.page import provenance, values_of
 from ringsim.report.shell import written
-from ringsim.tables import Table, block_lines, counted, with_unit
+from ringsim.tables import Table, block_lines, counted, number_text, with_unit
 from ringsim.variables import Status
 
 ECSS = "ECSS-E-ST-33-01C (6 March 2009), Mechanisms"
@@ -355,6 +361,11 @@ _SHOWN = 5  # outputs that are told what matters for, where no requirement choos
 def _sensitivity(of: Of) -> Answer:
     table = what_matters(of.analysis)
     wanted = [line.partition(":")[0] for line in verdicts(of).evidence]
+    if one_at_a_time(of.campaign):
+        names = [n for n, one in quantities().items() if one.summary and n in of.analysis]
+        names = [name for name in names if name in wanted] or names[:_SHOWN]
+        told = [line for name in names if (line := _farthest(of, name))]
+        return Answer(told, lacks={} if told else {"effects": "run the base case again: it failed"})
     rows = [row for row in table.rows if row[0]]
     plain = [row for row in rows if row[0] in quantities() and quantities()[row[0]].summary]
     own = [row for row in rows if row[0] in wanted] or (plain or rows)[:_SHOWN]
@@ -368,6 +379,17 @@ def _sensitivity(of: Of) -> Answer:
     found.evidence += [note for note in table.notes if note.startswith("no significant")]
     cure = "more samples, or inputs that scatter"
     return found if rows else found + Answer(lacks={"effects beyond chance": cure})
+
+
+def _farthest(of: Of, name: str) -> str:
+    """The one change of all cases that moves an output most; empty if the base case has none."""
+    values = np.where(good(of.campaign), numbers(of.campaign, name), np.nan)
+    if not np.isfinite(values[0]) or not np.isfinite(values[1:]).any():
+        return ""
+    (factor, unit), far = unit_of(of.analysis, name), int(np.nanargmax(np.abs(values - values[0])))
+    base, most = (with_unit(number_text(factor * values[k]), unit) for k in (0, far))
+    change = other_than_base(of.campaign, far)
+    return f"{name}: {base} in the base case, farthest {most} with {change}"
 
 
 @item(ECSS, "4.8.2.6.3 e, f Test", "Differences of test and prediction are explained.")

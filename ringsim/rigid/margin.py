@@ -279,11 +279,20 @@ def least_along(
         if end <= way.times[0] or begin > way.times[-1] or begin >= drive.conditions.end:
             continue
         now = way.between(begin, end)
-        told = [one for time, one in known if begin - AT_ONCE <= time < end - AT_ONCE]
+        own = [(time, one) for time, one in known if begin - AT_ONCE <= time < end - AT_ONCE]
         low, high = float(now.angles.min()), float(now.angles.max())
-        least = drive.least(low, high, float(now.times[0]), told)
-        found.append(Least(min(least.margin, MOST), now.time_at(least.angle), least.angle))
+        least = drive.least(low, high, float(now.times[0]), [one for _, one in own])
+        time = now.time_at(least.angle)
+        # Of a joint that sticks the margin is -1 all the time: then when that began.
+        same = [(when, one) for when, one in own if one.margin <= least.margin + _SAME]
+        if same and same[0][0] < time:
+            time, least = same[0]
+        found.append(Least(min(least.margin, MOST), time, least.angle))
     return min(found)
+
+
+_SAME = 1e-9
+"""Difference of two margins that is round-off."""
 
 
 def with_margin(

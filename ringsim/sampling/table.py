@@ -171,8 +171,14 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
             return [""]
         counts = {path: _each_of(base, path, middle) for path in paths}
     except InputError as error:
+        if "." not in name and f"{name} is not a known key" in str(error):
+            raise InputError(
+                f"inputs: {error}; a name of one's own takes shared = [PATH, ...], or an input of "
+                'kind = "function" that follows it'
+            ) from None
         # A value that nobody has written; a path that is none is at fault with any.
-        if isinstance(middle, float) and "is not a known key" not in str(error):
+        at_fault = "is not a known key", "there is no value"
+        if isinstance(middle, float) and not any(words in str(error) for words in at_fault):
             told = f"inputs: {name}: {show(middle)} is the median of what is drawn for it"
             raise InputError(f"{told}, and {error}") from None
         raise InputError(f"inputs: {error}") from None

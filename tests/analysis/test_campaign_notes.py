@@ -267,7 +267,7 @@ def test_drive_margins_before_a_winch_starts_are_told_beside_the_margin() -> Non
     made["least_drive_margin_started_angle"] = "sample", np.full(4, 14.0)
     line = (
         "in 3 of 4 samples the least drive margin is that of a time before the last winch "
-        "starts; from then on all have at least -0.2 (sample 2, at 14 deg)"
+        "starts; counted from then on the least of all samples is -0.2 (sample 2, at 14 deg)"
     )
     table = margin_table(analyse(made))
     assert not table.notes  # it is a margin already

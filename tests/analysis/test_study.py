@@ -124,7 +124,10 @@ def test_rings_that_never_opened_are_counted_beside_the_limit_that_they_keep_to(
     made = campaign(values, outcome=outcome)
     found = analyse(made, MOST_TEN)
     assert found.samples_short.item() == 3
-    line = "asynchrony_max: 3 of the 238 samples that meet it ended before the antenna was deployed"
+    line = (
+        "asynchrony_max: 3 of the 238 samples that meet it ended before all V-joints had come to "
+        "180 deg"
+    )
     assert line in text_of(found)
     assert 'set a requirement on the outcome, too: outcome = { is = "deployed"' in text_of(found)
     outcome_too = {"outcome": {"is": "deployed", "probability": 0.9, "confidence": 0.9}}

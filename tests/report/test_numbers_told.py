@@ -262,8 +262,7 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
             (int(short.sum()), f"{name}: "),
         ):
             text = f"{words}{count}" if words.endswith("far): ") else (
-                f"{words}{count} of the {used - bad} samples that meet it "
-                "ended before the antenna was deployed"
+                f"{words}{count} of the {used - bad} samples that meet it ended before "
             )  # fmt: skip
             assert any(each.startswith(text) for each in lines) == (count > 0), text
 

@@ -5,7 +5,7 @@ import re
 import textwrap
 from collections.abc import Iterator
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -368,8 +368,12 @@ def _draw(axes: Axes, bars: Bars) -> None:
         # An index is a share: what it has below zero is its own error.
         signed = measure.endswith("rank_correlation")
         for side in np.unique(np.sign(bars.values)) if signed else (1.0,):
-            axes.axvline(side * bars.chance, color=style.VERMILION, linestyle="dashed",
-                         linewidth=1.2, label=_BY_CHANCE)  # fmt: skip
+            look: Any = {"color": style.VERMILION, "linestyle": "dashed", "linewidth": 1.2}
+            if second:  # chance gives bars of the other measure something else
+                axes.vlines([side * bars.chance] * len(height), height + shift - 0.17,
+                            height + shift + 0.17, label=_BY_CHANCE, **look)  # fmt: skip
+            else:
+                axes.axvline(side * bars.chance, label=_BY_CHANCE, **look)
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
     axes.locator_params(axis="x", nbins=5)
     # What a fault breaks, and when, has no room here: "faults = jammed-pulley".
