@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_notes import doubted, late_line, marked, plane_margin
 from ringsim.analysis.design import (
@@ -131,11 +132,19 @@ def _chosen(campaign: xr.Dataset, place: int) -> list[str]:
     ]  # fmt: skip
     told = [str(each.values[place]) for each in labels]
     for variable in (campaign[name] for name in inputs(campaign)):
-        values = [_value(each, _units(variable)) for each in variable.to_numpy().tolist()]
-        most, count = Counter(values).most_common(1)[0]
-        if values[place] != most and 2 * count > len(values):
-            told.append(f"{called(variable)} = {values[place]} (most: {most})")
+        for of, column in _columns(variable):
+            values = [_value(each, _units(variable)) for each in column.tolist()]
+            most, count = Counter(values).most_common(1)[0]
+            if values[place] != most and 2 * count > len(values):
+                told.append(f"{of}{called(variable)} = {values[place]} (most: {most})")
     return told
+
+
+def _columns(variable: xr.DataArray) -> list[tuple[str, NDArray[Any]]]:
+    """Values of an input over samples, of each place of it, and the place in words."""
+    values = variable.to_numpy()
+    of = [""] if values.ndim == 1 else [f"{one} of " for one in place_names(variable)]
+    return list(zip(of, values.reshape(len(values), -1).T, strict=True))
 
 
 def one_at_a_time(campaign: xr.Dataset) -> bool:
@@ -149,12 +158,10 @@ def other_than_base(campaign: xr.Dataset, place: int) -> str:
     """
     told = []
     for variable in (campaign[name] for name in inputs(campaign)):
-        values = variable.to_numpy()
-        rows = values.reshape(len(values), -1)
-        of = [""] if values.ndim == 1 else [f"{one} of " for one in place_names(variable)]
-        for k in np.flatnonzero(rows[place] != rows[0]).tolist():
-            new, base = (_value(rows[row, k], _units(variable)) for row in (place, 0))
-            told.append(f"{of[k]}{called(variable)} = {new} (base: {base})")
+        for of, column in _columns(variable):
+            if column[place] != column[0]:
+                new, base = (_value(column[row], _units(variable)) for row in (place, 0))
+                told.append(f"{of}{called(variable)} = {new} (base: {base})")
     return "; ".join(told[:_MOST]) or "the base case"
 
 

@@ -82,6 +82,12 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     lines = "\n".join(all_told(analyse(made)))
     assert " ".join(first.split()) in " ".join(lines.split())
     assert remark_lines(made_campaign(3)) == []
+    # Also where it is the reason itself, and of rings of which only half came so far.
+    one = "1 of 24 latches did not catch: upper 5"
+    half = "2 of the 12 latches that were met did not catch: upper 5, lower 6"
+    reasons = [reached, f"{one}; stalled", f"came to rest; {half}"]
+    caught = made_campaign(3).assign(reason=("sample", np.array(reasons, dtype=object)))
+    assert f"in 2 of 3 samples, for example in sample 1: {one}" in remark_lines(caught)
     again = "reached (start 2 with solver.step = 0.1 s; start 1: too much energy (10 %): reduce it)"
     once_more = made.assign(reason=("sample", np.array([again] + [reached] * 11, dtype=object)))
     assert remark_lines(once_more) == [

@@ -404,6 +404,34 @@ def test_laws_that_differ_behind_a_long_beginning_are_told():
     assert "time = 400.0" in line
 
 
+def test_inputs_that_follow_others_or_share_their_values_are_told_as_such():
+    """And not by the value of the scene, which no sample has."""
+    one, two = with_input(seeded(VALUES), VALUES, "loads.force"), seeded(VALUES)
+    law = {"kind": "function", "input": "lot", "table": [["A", 0.02], ["B", 0.06]]}
+    lot = {"kind": "discrete", "values": ["A", "B"]}
+    shared = {"kind": "uniform", "low": 0.0, "high": 1.0, "shared": ["rods.damping", "net.gap"]}
+    columns = (("lot", "", "lot", lot), ("joints_c", "joints.c", "lot", law),
+               ("loads_force", "loads.force", "lot", law),
+               ("rods_damping", "rods.damping", "mu", shared))  # fmt: skip
+    for name, path, leader, words in columns:
+        says = {"role": "input", "path": path, "input": leader, "distribution": json.dumps(words)}
+        two[name] = "sample", VALUES, says
+    scene = "rods.damping = 0.5\nloads.force = 3.0\njoints.c = 1.0\nnet.gap = 0.1\n"
+    for made in (one, two):
+        made.attrs["scene"] = scene
+    found = compare(one, two)
+    told = {str(name): (str(a), str(b)) for name, a, b in zip(
+        found.setting.values, found.setting_first.values, found.setting_second.values, strict=True
+    )}  # fmt: skip
+    follows = "follows lot: 0.02 at A, 0.06 at B"
+    assert told["input joints.c"] == ("1.0, not drawn", follows)
+    assert told["input loads.force"][1] == follows
+    assert told["input rods.damping"] == ("0.5, not drawn", "that of mu")
+    assert told["input net.gap"] == ("0.1, not drawn", "that of mu")
+    assert told["input lot"][0] == "none"
+    assert not any(each[1].endswith("not drawn") for each in told.values())
+
+
 def test_of_blocks_the_samples_that_stand_for_the_population_are_compared():
     design = Saltelli(samples=16, replicates=8)
     made = drawn_campaign(design, ishigami, 3, 1)

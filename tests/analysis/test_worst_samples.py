@@ -176,6 +176,28 @@ def test_a_sample_on_the_other_side_is_not_told_by_what_separates_the_rest() -> 
     assert all(row.startswith("temperature") for row in others)
 
 
+def test_one_of_two_values_that_separates_is_told_though_half_of_all_have_it() -> None:
+    limit = np.where(np.arange(12) % 2, 50.0, 20000.0)
+    one = campaign(np.where(limit < 100.0, np.nan, 5.0),
+                   status=np.where(limit < 100.0, Status.DIVERGED, Status.OK),
+                   outcome=np.where(limit < 100.0, Fate.NONE, Fate.DEPLOYED))  # fmt: skip
+    for name, values in {"limit": limit, "noise": np.random.default_rng(5).random(12)}.items():
+        one[name] = "sample", values, {"role": "input", "path": name, "units": "1"}
+    rows = analyse(one).worst_inputs.values.tolist()
+    assert rows
+    assert all(row.startswith("limit 50 (") for row in rows)
+
+
+def test_of_a_list_of_cases_labels_and_what_most_have_otherwise_are_told() -> None:
+    one = campaign(np.arange(5.0), design={"kind": "list", "file": "cases.csv"})
+    names = np.array(["nominal", "late", "stopped", "cold", "cold and late"], dtype=object)
+    one["case"] = "sample", names, {"role": "label", "path": ""}
+    for name, values in {"start": [0.0, 5.0, 0.0, 0.0, 5.0], "rate": np.arange(5.0)}.items():
+        one[name] = "sample", np.array(values), {"role": "input", "path": name, "units": "s"}
+    told = unusual(one, [0, 1, 2])
+    assert told == ["nominal", "late; start = 5 s (most: 0 s)", "stopped"]
+
+
 def test_a_drawn_fault_comes_before_rarer_numbers() -> None:
     random = np.random.default_rng(4)
     stuck, noise = np.arange(60) % 12 == 0, random.random((60, 5))

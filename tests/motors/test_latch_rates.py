@@ -10,7 +10,7 @@ import pytest
 import scipy
 from loops import for_each
 
-from ringsim.outputs.base import may_be_off, unresolved
+from ringsim.outputs.base import jerked, may_be_off, unresolved
 from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
@@ -221,6 +221,21 @@ def test_least_and_largest_rate_are_told_by_their_own_uncertainty_or_a_worse_one
     assert cure.startswith(f"set solver.tolerance = {tolerance:.1e} (")
     missing = [0.1, math.nan, 0.3, 0.4]
     assert named(missing, [0.3, math.nan, 0.0, 0.0], calm) == ["peak_latch_rate"]
+
+
+@pytest.mark.quick
+def test_a_latch_that_the_lock_of_another_within_two_steps_may_decide_is_told() -> None:
+    """With the share of its rate that is told of the rate itself, 15 %: 0.1 rad/s, of 0.11."""
+    times = np.arange(0.0, 3.0, 0.1)
+    series = Series(times, np.zeros((30, 2, 2)), times)
+    for asked, lock, told in ((0.11, 2.25, True), (0.14, 2.25, False), (0.11, 1.95, False)):
+        scene = load_scene("truss2").with_values({"latch.min_rate": asked})
+        locks = np.array([[0.25, 0.95], [lock, 2.35]])
+        own = Run(scene, series, series, locks, {}, {})
+        rates = np.array([[0.5, 0.5], [0.5, 0.1]])
+        own.__dict__["history"] = History(rates, locks, np.zeros((2, 2)))
+        assert jerked(own).startswith("; whether the latch of lower 2 catches") == told
+        assert bool(jerked(own)) == told
 
 
 @pytest.mark.quick

@@ -279,6 +279,38 @@ def test_what_a_campaign_lacks_is_missing_with_its_cure() -> None:
 
 
 @pytest.mark.quick
+def test_error_bars_of_a_list_of_cases_are_told_although_it_has_no_means() -> None:
+    campaign = made_campaign(4)
+    campaign.attrs["design"] = json.dumps({"kind": "list", "file": "cases.csv"})
+    bars = np.array([0.1, np.nan, 0.4, 0.2])
+    campaign["asynchrony_max_error"] = "sample", bars, {"units": "degree"}
+    nasa = rows_of(campaign, NASA)
+    own = row(nasa, "verification (second-hand)")["result"].splitlines()
+    assert "asynchrony_max: largest of 3 error bars: 0.4 deg (sample 2)" in own
+    assert not any("error bars (error_bars_every)" in line for line in own)
+    uncertain = row(nasa, "results uncertainty (second-hand)")["result"]
+    assert "numerical errors" not in uncertain
+    campaign = campaign.drop_vars("asynchrony_max_error")
+    for name in [n for n in campaign if str(n).endswith("_error") and n[:-6] in campaign]:
+        campaign = campaign.drop_vars(name)
+    nasa = rows_of(campaign, NASA)
+    assert "error bars (error_bars_every)" in row(nasa, "verification (second-hand)")["result"]
+    assert "numerical errors (" in row(nasa, "results uncertainty (second-hand)")["result"]
+
+
+@pytest.mark.quick
+def test_of_one_change_each_the_farthest_is_told() -> None:
+    campaign = made_campaign(4)
+    campaign.attrs["design"] = json.dumps({"kind": "one-at-a-time"})
+    campaign["asynchrony_max"] = "sample", np.array([5.0, 6.0, 2.0, 5.0]), {"units": "degree"}
+    named = [n for n, v in campaign.variables.items() if v.attrs.get("role") == "input"]
+    told = row(rows_of(campaign), "Sensitivity analysis")["result"]
+    (line,) = (li for li in told.splitlines() if li.startswith("asynchrony_max"))
+    assert line.startswith("asynchrony_max: 5 deg in the base case, farthest 2 deg with ")
+    assert any(str(campaign[n].attrs.get("path") or n) in line for n in named)
+
+
+@pytest.mark.quick
 def test_a_key_that_is_set_is_no_cure() -> None:
     campaign = made_campaign(4)
     said = "Missing: peak_base_force (record.reactions = true)"
