@@ -392,8 +392,9 @@ def calibration_tables(found: xr.Dataset) -> list[Table]:
             number_text(float(one["learnt"]), 2),
         ))  # fmt: skip
     notes = [
-        "90 % intervals; remaining scatter: that of the posterior over that of the prior, 1 where "
-        "the data say nothing",
+        "90 % intervals; remaining scatter: that of the posterior over that of the prior, both of "
+        "the normal variable behind the law (lognormal: the logarithm), 1 where the data say "
+        "nothing",
         *_hardly(found),
         *_together(found),
         *_beyond(found),

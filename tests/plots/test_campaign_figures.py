@@ -540,7 +540,7 @@ def test_a_sheet_has_the_panels_that_matter_and_names_the_others() -> None:
     assert len(labels) == 9
     assert labels[0].startswith("cables.lower_winch_stop_time")
     assert any(label.startswith("input 19") for label in labels[:5])
-    assert "inputs whose rank correlation with the number is smaller" in words(figure)
+    assert "inputs, which of all that are numbers have the smallest rank" in words(figure)
 
 
 def test_lags_ahead_are_lighter_than_lags_behind() -> None:

@@ -194,9 +194,11 @@ def _bars(
     held = np.isfinite(inside)
     # What alone goes with an output may be a place of an input whose mean is held: see influence.
     plain = "rank_correlation" if second == "partial_rank_correlation" else "-"
+    ends = of(f"{measure}_interval", (2,))
+    if measure.endswith("_index"):  # longer than all of the variance: tables say that few decide it
+        ends = np.where(np.diff(ends) > 1.0, np.nan, ends)
     return Bars(
-        measure, names[order].tolist(), values[order],
-        of(f"{measure}_interval", (2,)), inside, of(f"{second}_interval", (2,)),
+        measure, names[order].tolist(), values[order], ends, inside, of(f"{second}_interval", (2,)),
         np.where(held, np.nan, of(plain, ())),
         np.where(held[:, None], np.nan, of(f"{plain}_interval", (2,))),
         np.nan if chance is None or not len(order) else float(np.min(chance[order])), told,
