@@ -193,7 +193,8 @@ def _odd(variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
     name = called(variable)
     if _has_words(variable):
         share, words = _word(variable, sample)
-        if share <= 2.0 * RARE:  # words have no side
+        fault = variable.attrs.get("path") == "faults" and variable.values[sample] != "none"
+        if fault or share <= 2.0 * RARE:  # words have no side
             yield _Oddity(share, words, before=True)
         return
     numbers, odd = variable.to_numpy().astype(float), list[_Oddity]()

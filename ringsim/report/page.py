@@ -35,7 +35,7 @@ from ringsim.analysis.worst import first_clause, note_on_unusual, worst_tables
 from ringsim.files import write_text
 from ringsim.measured import Measurement
 from ringsim.outputs.base import without_doubts
-from ringsim.overrides import flat
+from ringsim.overrides import flat, pulleys_at
 from ringsim.plots import style
 from ringsim.plots.comparison import figures_of_both, measured_and_computed
 from ringsim.plots.figures import figures_of
@@ -173,7 +173,8 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
     drawn = [*varies]
     text = builtin_scenes().get(str(wanted.get("scene", "")), "")
     written, comments = flat(tomllib.loads(text)), _comments(text)
-    rows, own = [], flat(tomllib.loads(str(campaign.attrs["scene"])))
+    nested = tomllib.loads(str(campaign.attrs["scene"]))
+    rows, own = [], flat(nested)
     for path, value in own.items():
         comment, origin = comments.get(path, ""), "scene"
         if _under(path, drawn):
@@ -181,7 +182,10 @@ def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
             if leader := _leader(campaign, varies.get(path, "")):
                 comment = f"follows {leader}"
         elif _holds(path, drawn):
-            origin = "drawn in part"
+            whole = len(value) if isinstance(value, list) else len(pulleys_at(nested, path))
+            parts = sum(each.startswith(f"{path}[") for each in drawn)
+            every = parts == (whole or own.get("structure.sections"))
+            origin = "drawn" if every else "drawn in part"
         elif _under(path, settings):
             origin, comment = "campaign", ""
         elif "inferred" in comment:

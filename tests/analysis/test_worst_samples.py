@@ -145,8 +145,6 @@ def test_what_separates_the_failures_is_named_first_however_common_it_is() -> No
     rows = analyse(one).worst_inputs.values.tolist()
     assert len(rows) == 3
     assert all(row.startswith("faults = stuck-vjoint (as in 25 of 100)") for row in rows)
-    # On its own it is not rare, and without the analysis nobody knows what separates.
-    assert not any("faults" in row for row in worst(one, {}).worst_inputs.values)
     ((_, name, told, _),) = what_separates(analyse(one)).rows
     assert (name, told) == ("faults = stuck-vjoint", "more often by 100 percentage points")
 
@@ -186,6 +184,13 @@ def test_one_of_two_values_that_separates_is_told_though_half_of_all_have_it() -
     rows = analyse(one).worst_inputs.values.tolist()
     assert rows
     assert all(row.startswith("limit 50 (") for row in rows)
+
+
+def test_a_fault_that_was_drawn_is_told_however_common_it_is() -> None:
+    one = stalled_by(np.arange(30) % 5 == 0, np.full(30, 293.0), np.zeros((30, 0)))
+    first, second = unusual(one, [0, 1])
+    assert first == "faults = stuck-vjoint (as in 6 of 30)"
+    assert second == "nothing unusual"
 
 
 def test_of_a_list_of_cases_labels_and_what_most_have_otherwise_are_told() -> None:
