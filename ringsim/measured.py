@@ -76,7 +76,7 @@ class Clock(Model):
         planned = self.interval is not None and self.end is not None
         if bool(self.column) == planned or (self.interval is None) != (self.end is None):
             raise ValueError(
-                "give column, a column of the table, or, before there is one, interval and end"
+                "column: give a column of the table, or, before there is one, interval and end"
             )
         if planned and not 0.0 < (self.interval or 0.0) <= (self.end or 0.0):
             raise ValueError(

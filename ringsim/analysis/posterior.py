@@ -440,14 +440,15 @@ def _together(found: xr.Dataset) -> list[str]:
 
 def _beyond(found: xr.Dataset) -> list[str]:
     """Unknowns whose prior hardly holds what was found."""
-    far = np.abs(found["shift"].values) > _FAR
-    return [
-        f"{name} lies {shift:+.1f} sigma from the median of its prior: widen the prior, if it is "
-        "no fault of this one place"
-        for name, shift in zip(
-            found["unknown"].values[far], found["shift"].values[far], strict=True
+    lines, groups = list[str](), found["input"].values
+    for k in np.flatnonzero(np.abs(found["shift"].values) > _FAR).tolist():
+        several = int((groups == groups[k]).sum()) > 1
+        place = ", if it is no fault of this one place" * several
+        lines.append(
+            f"{found['unknown'].values[k]} lies {float(found['shift'][k]):+.1f} sigma from the "
+            f"median of its prior: widen the prior{place}"
         )
-    ]
+    return lines
 
 
 def _standing_out(found: xr.Dataset) -> list[str]:

@@ -318,6 +318,6 @@ def _of_campaign(told: xr.Dataset) -> list[str]:
     if beyond := int(told["beyond_samples"].sum()):
         notes.append(
             f"beyond all samples by more than {_FAR:g} sigma: {counted(beyond, 'reading')}, which "
-            "no values give that were drawn of the inputs"
+            "none of the drawn values of the inputs gives"
         )
     return notes

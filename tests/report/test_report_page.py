@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
+from ringsim.overrides import pulleys_at
 from ringsim.plots import figures as of_campaigns
 from ringsim.plots.ring import lines_at
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
@@ -248,6 +250,16 @@ def test_inputs_of_one_place_and_of_several_paths_have_their_origin() -> None:
     assert found["cables.upper.friction.coefficient"] == "drawn in part"
     assert found["cables.lower.friction.coefficient"] == "inferred"
     assert one not in found
+    # Of every place one by one, as of a posterior, or beside a place with a law of its own.
+    scene = tomllib.loads(campaign.attrs["scene"])
+    last = campaign["cables_upper_friction_coefficient"]
+    for number, name in enumerate(pulleys_at(scene, "cables.upper.friction.coefficient")):
+        path = f'cables.upper.friction.coefficient["{name}"]'
+        says = last.attrs | {"path": path, "input": path}
+        campaign[f"pulley_{number}"] = "sample", last.values.reshape(4, -1)[:, 0], says
+    campaign = campaign.drop_vars("cables_upper_friction_coefficient")
+    found = {each.path: each.origin for each in model.values_of(campaign)[0]}
+    assert found["cables.upper.friction.coefficient"] == "drawn"
 
 
 def test_values_that_their_paths_do_not_explain_have_a_remark() -> None:
