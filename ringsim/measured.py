@@ -21,7 +21,7 @@ A TOML file names a CSV table beside it, its clock, and its sensors::
 import csv
 import io
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -229,6 +229,25 @@ class Measurement:
     readings: tuple[Readings, ...]
 
 
+def by_clock(measurement: Measurement, offset: float, drift: float) -> Measurement:
+    """The same readings by another clock."""
+    old = measurement.file.clock
+    if old is None:
+        return measurement
+    scale = (1.0 + drift) / (1.0 + old.drift)
+
+    def moved(each: Readings) -> Readings:
+        times, values = offset + scale * (each.times - old.offset), each.values
+        if np.isnan(each.times).all() and VARIABLES[each.sensor.variable].units == "s":
+            start = is_instant(each.sensor.variable)
+            values = offset * start + scale * (values - old.offset * start)
+        return replace(each, times=times, values=values)
+
+    clock = old.model_copy(update={"offset": offset, "drift": drift})
+    file = measurement.file.model_copy(update={"clock": clock})
+    return Measurement(file, tuple(map(moved, measurement.readings)))
+
+
 def load_measured(path: str | Path, *, planned: bool = False) -> Measurement:
     """The measured data that a TOML file describes; NaN for readings of a test still to come, which
     is refused unless ``planned``.
@@ -358,8 +377,10 @@ def _from_csv(path: Path, wanted: list[str]) -> dict[str, Array]:
     head = [cell.strip() for cell in head]
     for name in wanted:
         if head.count(name) != 1:
-            hint = "two columns are called so" if name in head else known_or_nearest(name, head)
-            raise InputError(f"{path.name}: column {show(name)} is not in its heads ({hint})")
+            wrong = f"is not in its heads ({known_or_nearest(name, head)})"
+            if name in head:
+                wrong = "stands twice in its heads: give each column a head of its own"
+            raise InputError(f"{path.name}: column {show(name)} {wrong}")
     found = {name: np.empty(len(rows)) for name in wanted}
     for number, row in enumerate(rows, 1):
         if len(row) != len(head):
@@ -382,6 +403,6 @@ def _number(cell: str, where: str, column: str) -> float:
     if not math.isfinite(value):
         raise InputError(
             f"{where}, column {show(column)}: {show(cell)} is no finite number: give one with a "
-            "decimal point, or leave the cell empty"
+            "decimal point, leave the cell empty (not that of the clock), or leave out the row"
         )
     return value

@@ -48,7 +48,7 @@ from ringsim.analysis.requirements import (
 )
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.verdicts import Verdict, judge, verdict_about, verdict_text
-from ringsim.analysis.worst import margins
+from ringsim.analysis.worst import margins_of
 from ringsim.outputs.base import may_be_off
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
@@ -344,8 +344,7 @@ def _limits(both: Both) -> dict[str, Any]:
     """The worst value of both sides and the margin of each to its own limit, for limits that both
     have, see ``worst.margins``; no variables without any.
     """
-    known = [margins(each if "sample" in each.dims else each.expand_dims(sample=[0]))
-             for each in both]  # fmt: skip
+    known = margins_of(both)
     if not all("limit" in each.dims for each in known):
         return {}
     texts = [each["limit_text"].values.tolist() for each in known]

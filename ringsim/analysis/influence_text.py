@@ -376,7 +376,11 @@ def what_matters(analysis: xr.Dataset) -> Table:
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         count = counted(analysis.sizes["input"], "input")
         twice = measure in _CHANCE and bool(_correlated(analysis))
-        how = " by its index or its partial rank correlation" * twice
+        held = any(
+            np.isfinite(analysis[f"{name}_partial_rank_correlation"]).any()
+            for name in _correlated(analysis)
+        )
+        how = f" by its index or its {'partial ' * held}rank correlation" * twice
         outputs, often = len(quiet) + sum(bool(row[0]) for row in rows), 10 if twice else 20
         many = f", so up to {outputs / often:.3g} of the {outputs} outputs tested"
         notes.append(

@@ -472,7 +472,7 @@ def _standing_out(found: xr.Dataset) -> list[str]:
             f"{name}: " + (f"stands out from the other places: {'; and '.join(parts)}" if parts else
                            f"no place stands out; the farthest is {called[best]} "
                            f"({sigma[best]:+.1f} sigma)")
-            + f" (false alarms: at most {FALSE_ALARM:g} if all are as the prior says)"
+            + f" (false alarms: at most {FALSE_ALARM:g} if all are as the prior says)" * bool(parts)
         )  # fmt: skip
         if parts:
             suspect = called[int(np.flatnonzero(own["group"] > 0)[0])]

@@ -1,12 +1,13 @@
 """What runs say beside measured data: differences by sensor, in units and in scatter."""
 
+import json
 import math
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from ringsim.measured import Measurement, Readings, is_instant
+from ringsim.measured import Measurement, Readings, by_clock, is_instant
 from ringsim.outputs.family import VARIABLES, axes, holds, supply
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene
@@ -59,6 +60,7 @@ def residuals(run: xr.Dataset, measurement: Measurement) -> list[Residuals]:
 
     InputError if a run has not the variable or the place of a sensor.
     """
+    measurement = by_found_clock(run, measurement)
     if "sample" not in run.dims:
         return [_of(run, readings) for readings in measurement.readings]
     good = run.isel(sample=np.flatnonzero(run["status"].to_numpy() == Status.OK))
@@ -69,6 +71,31 @@ def residuals(run: xr.Dataset, measurement: Measurement) -> list[Residuals]:
         _of_samples(readings, values)
         for readings, values in zip(measurement.readings, every, strict=True)
     ]
+
+
+def by_found_clock(run: xr.Dataset, measurement: Measurement) -> Measurement:
+    """A test by the clock that a calibration has found, if the campaign draws from its posterior,
+    and the test's file has not been given another one since.
+    """
+    found = json.loads(run.attrs.get("clocks", "{}")).get(measurement.file.name)
+    clock = measurement.file.clock
+    if not found or clock is None:
+        return measurement
+    (was, offset), (rate, drift) = found["offset"], found["drift"]
+    same = np.allclose([was, rate], [clock.offset, clock.drift], rtol=1e-9, atol=1e-12)
+    return by_clock(measurement, offset, drift) if same else measurement
+
+
+def clock_line(run: xr.Dataset, measurement: Measurement) -> str:
+    """What is told of a clock that is not the file's; empty if it is."""
+    clock, own = by_found_clock(run, measurement).file.clock, measurement.file.clock
+    if clock is None or own is None or clock == own:
+        return ""
+    drift = f" and a drift of {clock.drift:.3g}" * (clock.drift != own.drift)
+    return (
+        f"times of {measurement.file.name} by the clock that the calibration has found: an offset "
+        f"of {clock.offset:.4g} s{drift}"
+    )
 
 
 _TAIL = 0.05
@@ -130,8 +157,13 @@ def _of(run: xr.Dataset, readings: Readings) -> Residuals:
     known = np.isfinite(found.values)
     times, values = found["time"].values[known], found.values[known]
     at = readings.times
-    inside = (at >= times[0]) & (at <= times[-1]) if len(times) else np.zeros(len(at), dtype=bool)
-    computed = np.interp(at[inside], times, values) if inside.any() else np.zeros(0)
+    stays = bool(readings.sensor.variable == "opening_angle" and int(run["outcome"]) in GOALS)
+    lock = np.nan
+    if stays and "lock_time" in run and int(run["outcome"]) == Fate.DEPLOYED:
+        lock = float(run["lock_time"].sel(readings.sensor.place))
+    computed = _at(at, times, values, holds=stays, lock=lock)
+    inside = np.isfinite(computed)
+    computed = computed[inside]
     return Residuals(readings, at[inside], readings.values[inside], computed, int((~inside).sum()))
 
 
@@ -259,8 +291,8 @@ def _farthest(each: Residuals) -> tuple[float, float]:
     return float(each.apart[k]), float(each.times[k])
 
 
-def residual_table(found: list[Residuals]) -> Table:
-    """The statistics as a table, the sensor that fits worst first."""
+def residual_table(found: list[Residuals], clock: str = "") -> Table:
+    """The statistics as a table, the worst sensor first, with what ``clock_line`` says."""
     told, rows = residual_statistics(found), []
     sampled = "within_band" in told
     sizes = np.nan_to_num(told["rms_in_deviations"].values, nan=-1.0)
@@ -288,7 +320,7 @@ def residual_table(found: list[Residuals]) -> Table:
         *(("within 90 %", "beyond all samples") if sampled else ("rms / sigma",)),
     )  # fmt: skip
     if sampled:
-        return Table(head, rows, _of_campaign(told))
+        return Table(head, rows, [*filter(None, [clock]), *_of_campaign(told)])
     notes = [
         "difference: measured less computed; rms / sigma is 1 where nothing but the scatter of "
         "the readings sets them apart, and more where the model or its values do",

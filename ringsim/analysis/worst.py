@@ -450,7 +450,14 @@ _AT_ONCE = 64
 """Samples whose series are read at once."""
 
 
-def margins(campaign: xr.Dataset) -> xr.Dataset:
+def margins_of(both: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """The margins of two runs or campaigns, of one plane's cable of both if of either."""
+    campaigns = [each if "sample" in each.dims else each.expand_dims(sample=[0]) for each in both]
+    plane = next(filter(None, map(plane_margin, campaigns)), "")
+    return [margins(each, plane) for each in campaigns]
+
+
+def margins(campaign: xr.Dataset, plane: str = "") -> xr.Dataset:
     """The margin to each limit of the scene along ``limit``, of the worst of the samples whose
     numbers hold.
 
@@ -458,7 +465,8 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
     largest value, less 1), ``limit_value`` and ``limit_sample``; a limit holds for the whole run,
     so that values behind the last lock count, too: ``limit_of`` says so where one is larger than
     the peak, ``limit_output``.  Behind these the drive margin of scenes with one, which is one
-    already, and where it is least before a winch starts, that from then on.  Empty without any.
+    already, and where it is least before a winch starts, that from then on; and that of one
+    plane's own cable, the output ``plane``, or where it is news.  Empty without any.
     """
     rows = list[tuple[str, str, str, float, float, int, int, int]]()
     for path, peak, series, allowed, values, ratio in _ratios(campaign):
@@ -471,7 +479,7 @@ def margins(campaign: xr.Dataset) -> xr.Dataset:
         counts = int((known & (values > allowed)).sum()), int(known.sum())
         rows.append((told, peak, of, float(ratio[k]), float(values[k]), k, *counts))
     late = [f"{_DRIVE}_started"] * bool(late_line(campaign))
-    for name in (_DRIVE, *late, *filter(None, [plane_margin(campaign)])):
+    for name in (_DRIVE, *late, *filter(None, [plane or plane_margin(campaign)])):
         least = np.where(good(campaign), numbers(campaign, name), np.nan)
         if np.isfinite(least).any():
             k = int(np.nanargmin(least))

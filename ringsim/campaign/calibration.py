@@ -446,6 +446,7 @@ def _write_posterior(course: _Course) -> None:
         "runs": given.members * len(course.stages), "stages": len(course.stages),
         "scene": given.campaign.scene.to_toml(), "fidelity": asked.fidelity,
         "measured": given.measurement.file.name, "inputs": json.dumps(says),
+        "clock": json.dumps(_clock_found(given, names, laws)),
         "correlations": json.dumps(pairs), **build.provenance(),
     }  # fmt: skip
     path = course.folder / POSTERIOR
@@ -467,6 +468,17 @@ def _write_posterior(course: _Course) -> None:
             made = file.createVariable(name, "i8" if array.dtype.kind == "i" else "f8", dims)
             made[...] = array
             made.setncatts({"long_name": meaning, "units": "1"})
+
+
+def _clock_found(given: Given, names: list[str], laws: list[Calibrated]) -> dict[str, list[float]]:
+    """Offset and drift of the measured clock before and after; empty if they were no unknowns."""
+    clock = given.measurement.file.clock
+    own = {name: law for name, law in zip(names, laws, strict=True) if name.startswith("clock.")}
+    medians = {name[6:]: float(law.quantile(np.array([0.5]))[0]) for name, law in own.items()}
+    if clock is None or not medians:
+        return {}
+    before = {"offset": clock.offset, "drift": clock.drift}
+    return {name: [was, medians.get(name, was)] for name, was in before.items()}
 
 
 def _stray_times(course: _Course) -> list[float]:

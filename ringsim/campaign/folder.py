@@ -166,6 +166,8 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
         if before["campaign"] != campaign.text:
             changed = made["history"].replace("designed", _ANEW)
             attributes["history"] = f"{changed}\n{before['history']}"
+    if campaign.clocks:
+        attributes["clocks"] = json.dumps(dict(campaign.clocks))
     if wanted.outputs:
         attributes["outputs"] = derived.to_json(wanted.outputs)
     if wanted.rule is not None:

@@ -33,7 +33,7 @@ from ringsim.variables import Cause, Fidelity, Status, Variable
 _KEPT = (
     "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "design",
     "requirements", "check_every", "judge", "max_difference", "stop_when", "suspects", "modules",
-    "outputs", "source",
+    "outputs", "source", "clocks",
     "ringsim_version", "git_commit", "sources", "exudyn_version",
 )  # fmt: skip
 """Attributes of the design that a merged file has, too: what it was run with, whoever merges."""

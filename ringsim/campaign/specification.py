@@ -4,7 +4,7 @@ import contextlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -361,6 +361,8 @@ class Campaign:
     scene: Scene
     suspects: tuple[int, ...] = ()
     """Samples that run with the full model, too, because of their results."""
+    clocks: Mapping[str, Any] = field(default_factory=dict)
+    """Of tests that inputs were learnt from, see ``learnt_from``."""
 
     def draw(self) -> Table:
         """All inputs of all samples; InputError if the scene refuses one."""
@@ -382,13 +384,13 @@ class Campaign:
         return table
 
 
-def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str]]:
+def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str], dict[str, Any]]:
     """Put what ``inputs.from`` names into the tables of a campaign file, in its place; the name of
-    that file, and those of its inputs.
+    that file, those of its inputs, and the clock of its test.
     """
     inputs = table.get("inputs")
     if not isinstance(inputs, dict) or "from" not in inputs:
-        return "", []
+        return "", [], {}
     given = inputs["from"]
     given = {"file": given} if isinstance(given, str) else given
     if not isinstance(given, dict):
@@ -401,7 +403,7 @@ def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str]]:
     except ValidationError as error:
         raise InputError(explain(error, Learnt, f"{path.name}: inputs.from")) from None
     try:
-        found, pairs = learnt_from(path.parent / source.file, source.without)
+        found, pairs, clocks = learnt_from(path.parent / source.file, source.without)
     except InputError as error:
         raise InputError(f"{path.name}: {error}") from None
     own = flat({name: law for name, law in inputs.items() if name != "from"}, "kind")
@@ -420,7 +422,7 @@ def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str]]:
             )
     table["inputs"] = {**own, **found}
     table["correlations"] = [*(table.get("correlations") or []), *pairs]
-    return source.file, list(found)
+    return source.file, list(found), clocks
 
 
 def _median(law: Distribution) -> Any:
@@ -486,7 +488,7 @@ def campaign_of(
     if scene is None and isinstance(table.get("scene"), str):
         with contextlib.suppress(InputError):  # told below; kinds of its modules come first
             scene = load_scene(table["scene"], beside=path)
-    source, learnt = _add_learnt(table, path)
+    source, learnt, clocks = _add_learnt(table, path)
     try:
         specification = Specification.model_validate(table)
     except ValidationError as error:
@@ -545,4 +547,4 @@ def campaign_of(
     for name, each in specification.requirements.items():
         if wrong := beyond_joints(name, each, joints):
             raise InputError(f"{path.name}: requirements.{wrong}")
-    return Campaign(path, text, specification, varied)
+    return Campaign(path, text, specification, varied, clocks=clocks)

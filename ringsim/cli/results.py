@@ -404,7 +404,8 @@ def _compare_measured(run: Path, measured: Path, out: Path | None) -> None:
     measurement = load_measured(measured)
     with opened(run) as dataset:
         found = residuals.residuals(dataset, measurement)
-    for line in slim(residuals.residual_table(found)).lines():
+        clock = residuals.clock_line(dataset, measurement)
+    for line in slim(residuals.residual_table(found, clock)).lines():
         click.echo(line)
     _save(residuals.residual_statistics(found), out)
 

@@ -19,7 +19,7 @@ from ringsim.analysis.engines import differences, verdict
 from ringsim.analysis.influence_text import what_matters
 from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
-from ringsim.analysis.residuals import residual_table, residuals
+from ringsim.analysis.residuals import clock_line, residual_table, residuals
 from ringsim.analysis.study import SOURCES, analyse
 from ringsim.analysis.study_text import error_tables, head_lines, statistics_table, unit_of
 from ringsim.analysis.tails import tail_table
@@ -115,7 +115,11 @@ def dossier(
     analysis = analyse(campaign) if analysis is None else analysis
     scene = flat(tomllib.loads(str(campaign.attrs["scene"])))
     told = statistics_table(analysis, every=True), error_tables(analysis, every=True)
-    beside = Table((), ()) if test is None else residual_table(residuals(campaign, test))
+    beside = (
+        Table((), ())
+        if test is None
+        else residual_table(residuals(campaign, test), clock_line(campaign, test))
+    )
     mark = notes.MARK * bool(analysis.attrs[notes.NOTE])
     of = Of(campaign, analysis, scene, *told, mark, beside)
     found = list[Table]()

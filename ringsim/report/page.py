@@ -28,7 +28,13 @@ from ringsim.analysis.design import (
     paths_of,
 )
 from ringsim.analysis.intervals import good, lost, ran
-from ringsim.analysis.residuals import residual_table, residuals
+from ringsim.analysis.residuals import (
+    Residuals,
+    by_found_clock,
+    clock_line,
+    residual_table,
+    residuals,
+)
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import Section, head_lines, outputs_in, sections
 from ringsim.analysis.worst import first_clause, note_on_unusual, worst_tables
@@ -285,7 +291,11 @@ def page(
     sound = campaign["sample"].values[short & ~np.char.startswith(ended, LOST)].tolist()
     if _all_told(campaign, sound, worst_tables(analysis, folder)):
         fell_short = [row for row in fell_short if row[1].startswith(LOST)]
-    apart = [] if measurement is None else residuals(campaign, measurement)  # refuses others' tests
+    apart, clock = list[Residuals](), ""
+    if measurement is not None:
+        apart = residuals(campaign, measurement)  # refuses others' tests
+        clock = clock_line(campaign, measurement)
+        measurement = by_found_clock(campaign, measurement)
     shown = player(campaign, analysis, measurement)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = values_of(campaign)
@@ -317,7 +327,7 @@ def page(
     }  # fmt: skip
     figures = [(p.name, p.words, f) for p, f in pictures if matters or p.name != _MATTERS]
     if measurement is not None:
-        told["measured"] = Section("measured", "Measured data", [residual_table(apart)])
+        told["measured"] = Section("measured", "Measured data", [residual_table(apart, clock)])
         title = measurement.file.title or measurement.file.name
         figures.append((
             "measured", "Measured data beside the samples: on the left readings, the samples' "

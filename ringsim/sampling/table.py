@@ -227,8 +227,9 @@ class Learnt(Model):
 
 def learnt_from(
     file: Path, without: Sequence[str] = ()
-) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """The inputs and correlations, as tables of a campaign file, that a calibration has found.
+) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
+    """The inputs and correlations, as tables of a campaign file, that a calibration has found, and
+    the clock of its test by the test's name, offset and drift before and after.
 
     An input with a value for each place is one for each, as no two have learnt the same.
     InputError if the file has none.
@@ -243,7 +244,8 @@ def learnt_from(
     require_regular(file)
     try:
         with netCDF4.Dataset(file) as data:
-            words = {name: getattr(data, name, "") for name in ("inputs", "correlations")}
+            words = {n: getattr(data, n, "") for n in ("inputs", "correlations", "clock")}
+            test = getattr(data, "measured", "")
     except OSError as error:
         raise InputError(f"inputs.from: {file.name} cannot be read: {error}") from None
     if not words["correlations"]:
@@ -258,7 +260,9 @@ def learnt_from(
                 f"({known_or_nearest(name, inputs)})"
             )
     left = {name: law for name, law in inputs.items() if name not in without}
-    return left, [pair for pair in pairs if all(name in left for name in pair["between"])]
+    clock = json.loads(words["clock"] or "{}")
+    pairs = [pair for pair in pairs if all(name in left for name in pair["between"])]
+    return left, pairs, {test: clock} if clock else {}
 
 
 def first_inside(path: str, others: Iterable[str]) -> str:

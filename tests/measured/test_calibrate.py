@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -20,6 +21,7 @@ from loops import for_each
 import ringsim
 from ringsim import simulation
 from ringsim.analysis.posterior import calibration_tables
+from ringsim.analysis.residuals import clock_line, residual_statistics, residuals
 from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
 from ringsim.cli import cli
 from ringsim.measured import load_measured
@@ -262,7 +264,7 @@ def test_ranks_of_mpi_find_the_same(test_files, found, tmp_path):
 
 def test_clock_of_the_stand_is_found_too(tmp_path):
     """Offset and drift are unknowns of the readings alone: no run knows them."""
-    write_test(tmp_path, TRUTH, clock=CLOCK)
+    stand_file = write_test(tmp_path, TRUTH, clock=CLOCK)
     more = (
         "[clock]\n"
         'offset = { kind = "normal", mean = 0.0, standard_deviation = 0.3 }\n'
@@ -280,6 +282,28 @@ def test_clock_of_the_stand_is_found_too(tmp_path):
         assert low - 0.3 * (high - low) < value < high + 0.3 * (high - low), name
     assert float(posterior["chance_of_all"].min()) > 1e-3
     assert posterior.attrs["inputs"].count("clock") == 0  # no campaign draws them
+    # Readings beside a campaign that draws from it are by the clock that was found.
+    found = posterior["posterior_quantile"].sel(level=0.5)
+    drawn = ringsim.Campaign(
+        scene(), {"from": str(tmp_path / "out" / POSTERIOR)}, {"kind": "random", "samples": 12},
+        fidelity="frame",
+    ).run(workers=0, out=tmp_path / "flight")  # fmt: skip
+    clocks = json.loads(drawn.attrs["clocks"])["stand"]
+    for name in CLOCK:
+        assert clocks[name] == [0.0, pytest.approx(float(found.sel(unknown=f"clock.{name}")))]
+    stand = load_measured(tmp_path / "stand.toml")
+    rms = residual_statistics(residuals(drawn, stand)).attrs["rms_in_deviations"]
+    assert rms == pytest.approx(1.0, abs=0.35)
+    unknown = drawn.copy()
+    unknown.attrs.pop("clocks")
+    assert residual_statistics(residuals(unknown, stand)).attrs["rms_in_deviations"] > 10.0
+    done = CliRunner().invoke(cli, ["compare", str(tmp_path / "flight"), str(stand_file)])
+    told = f"the clock that the calibration has found: an offset of {clocks['offset'][1]:.4g} s"
+    assert told in done.output
+    # A file that says another clock since is believed.
+    text = stand_file.read_text().replace('"t" }', '"t", offset = 0.31 }')
+    stand_file.write_text(text)
+    assert not clock_line(drawn, load_measured(stand_file))
 
 
 @pytest.mark.slow
