@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis import derived
 from ringsim.analysis.campaign_notes import NOTE, marked
 from ringsim.analysis.comparison import BADNESS
 from ringsim.analysis.indices import largest_by_chance
@@ -138,7 +139,8 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
     turned, tend, apart = dict[str, float](), dict[str, float](), dict[str, float]()
     still = list[str]()
     for name, variable in quantities().items():
-        if variable.summary is None or f"{name}_rank_correlation" not in found:
+        own = name in derived.declared()
+        if not (variable.summary or own) or f"{name}_rank_correlation" not in found:
             continue
         together = found[f"{name}_rank_correlation"].item()
         sizes = np.abs(found[f"{name}_mean"].values)
@@ -154,7 +156,7 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
     for some, sense in (
         (turned, "turn round: samples that are bad in one are good in the other"),
         (tend, "tend to turn round: samples that are bad in one are rather good in the other"),
-        (apart, "hardly go together: which samples are bad in one tells little of the other"),
+        (apart, "go together weakly: which samples are bad in one tells little of the other"),
     ):
         if some:
             named = ", ".join(f"{name} ({each:+.2f})" for name, each in some.items())
