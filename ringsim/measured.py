@@ -71,6 +71,10 @@ class Clock(Model):
     drift: Annotated[float, Field(ge=-0.1, le=0.1), Unit("1")] = 0.0
     """By how much the time of the run goes faster than the clock."""
 
+    def shown(self, time: float) -> float:
+        """A time of the run (s) as the clock shows it, in its unit."""
+        return (time - self.offset) / (1.0 + self.drift) / _UNITS["s"][self.unit]
+
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         planned = self.interval is not None and self.end is not None

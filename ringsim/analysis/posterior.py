@@ -19,11 +19,14 @@ Source: Cleary, Garbuno-Inigo, Lan, Schneider and Stuart, J. Comput. Phys. 424 (
 "Calibrate, emulate, sample", here with a linear emulator; for a linear model it is the closed form.
 """
 
+import itertools
+import json
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import scipy.special
+import scipy.stats
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -54,27 +57,27 @@ prior says."""
 _STRAY = 0.01
 """Probability with which a test without faults has a stray reading."""
 _OF_SENSOR, _OF_ALL = 0.25, 0.1
-"""Shares of a sensor's readings, and of those of all, beyond which it is not strays that are wrong:
-of 14 sensors with 18 readings each, 5 % of them gross errors, all are set aside in 97 tests of 100.
-"""
+"""Shares of a sensor's readings, and of those of all, up to which strays are believed."""
 _IN_A_ROW = 2
-"""Strays at most that follow each other: what a model lacks takes longer."""
+"""Strays that may always follow each other: what a model lacks takes longer."""
+_UNLIKELY = 0.05
+"""Chance below which a sensor has more strays than the others, if it is not few of its own."""
 _LEAST_KNOWN = 1e-12
 """Variance of a contrast of which the data say nothing, in place of round-off."""
 _LEAST_LEFT = 1e-3
-"""Share of a contrast's variance below which another place has explained it."""
+"""Share of a variance below which something else has explained it."""
 _HOLDS = 0.99
 """Probability with which the places that are named together hold the one that is unlike."""
 _LEAST_ROW = 5
 """Readings of a sensor from which on their course tells anything."""
-_HARDLY = 0.9
+HARDLY = 0.9
 """Posterior over prior scatter from which on an unknown has hardly been learnt: a fifth of the
 variance at most is gone."""
 _TOGETHER = 0.8
 """Correlation of two unknowns from which on the data tell a combination of them and hardly more."""
 _FAR = 4.0
 """Sigmas from the median of a prior beyond which it hardly holds a value: once in 16,000."""
-_LISTED = 6
+LISTED = 6
 """Unknowns up to which each has a column in a table of sensors."""
 
 
@@ -89,6 +92,9 @@ class Posterior(NamedTuple):
     """What the sensors would read at the mean, over their scatter, shape (readings,)."""
     off: Array
     """Scatter of runs off the map, the same way, shape (readings,)."""
+    leverage: Array
+    """Variance of what is expected by what is not known yet of the unknowns, over that of a reading
+    by its scatter, shape (readings,): how far the posterior follows this one."""
 
     def draw(self, count: int, stream: np.random.Generator, scale: float = 1.0) -> Array:
         """Points of it, wider by ``scale``, shape (count, unknowns)."""
@@ -129,8 +135,10 @@ def posterior_of(points: Array, outputs: Array, data: Array) -> Posterior:
     covariance = np.linalg.inv(np.eye(unknowns) + slopes @ weighed)
     mean = covariance @ (weighed.T @ (across @ (data - start)))
     off = np.sqrt((left**2).sum(axis=0) / freedom)
-    expected = start + mean @ slopes @ across
-    return Posterior(mean, 0.5 * (covariance + covariance.T), expected, off)
+    each = slopes @ across
+    leverage = np.einsum("ki,kl,li->i", each, covariance, each)
+    covariance = 0.5 * (covariance + covariance.T)
+    return Posterior(mean, covariance, start + mean @ each, off, leverage)
 
 
 class Told(NamedTuple):
@@ -145,6 +153,8 @@ class Told(NamedTuple):
     """Standard deviation of one reading."""
     bias: float = 0.0
     """That of what all readings of the sensor have in common."""
+    times: Array | None = None
+    """Of the readings, by the clock of the run, s; NaN for what has none."""
 
     def only(self, kept: Mask) -> "Told":
         """The readings that are kept, shape (readings,) of true and false."""
@@ -205,17 +215,19 @@ class Learnt(NamedTuple):
     misfits so alike in all sensors together ("pattern"), and in any sensor ("sensor pattern").  A
     model that is wrong by less than the scatter of a reading shows in its many readings.
     """
+    events: list[tuple[float, int]]
+    """Times (s) at which so many sensors were off together, which is no chance of each."""
 
 
 def learn(points: Array, told: Sequence[Told]) -> Learnt:
     """The posterior by all sensors, without stray readings; ``points`` as in ``posterior_of``.
 
     A reading is a stray if it is further off than one in ``1 / _STRAY`` tests has any by chance,
-    farthest first; a sensor that had too many of them, or too many in a row, is not explained, and
-    keeps them all.
+    farthest first, and does not fit what the others tell.  Readings that are off where chance does
+    not put strays (see ``_no_strays``) are what is not explained, and are kept.
     """
     kept = [np.ones(len(each.measured), dtype=bool) for each in told]
-    whole = set[int]()
+    whole, back, events = set[int](), set[tuple[int, int]](), list[tuple[float, int]]()
     while True:
         own = [each.only(mask) for each, mask in zip(told, kept, strict=True)]
         found = posterior_of(
@@ -224,32 +236,38 @@ def learn(points: Array, told: Sequence[Told]) -> Learnt:
         )  # fmt: skip
         ends = np.cumsum([len(each.measured) for each in own])[:-1]
         apart = np.split(np.concatenate([e.scaled(e.measured) for e in own]) - found.expected, ends)
-        sizes = [np.abs(a) / np.sqrt(1.0 + o**2)
-                 for a, o in zip(apart, np.split(found.off, ends), strict=True)]  # fmt: skip
+        # What the posterior follows hides its own misfit: of a scatter of 1 it leaves 1 - leverage.
+        left = np.sqrt(np.maximum(1.0 - found.leverage, _LEAST_LEFT) + found.off**2)
+        sizes = [np.abs(a) / s for a, s in zip(apart, np.split(left, ends), strict=True)]
+        aside = [_set_aside(found, points, *each) for each in zip(told, kept, strict=True)]
         open_ = [k for k, size in enumerate(sizes) if k not in whole and len(size)]
-        limit = -scipy.special.ndtri(0.5 * _STRAY / len(found.expected))
+        least = -float(scipy.special.ndtri(0.5 * _STRAY / len(found.expected)))
         # Others may only look stray beside a farther one.
-        limit = max(limit, 0.5 * max((float(sizes[k].max()) for k in open_), default=0.0))
+        limit = max(least, 0.5 * max((float(sizes[k].max()) for k in open_), default=0.0))
         worst = [k for k in open_ if (sizes[k] > limit).any()]
-        if not worst:
-            break
         for k in worst:
             kept[k][np.flatnonzero(kept[k])[sizes[k] > limit]] = False
-        many = sum(int((~mask).sum()) for mask in kept) > _OF_ALL * sum(map(len, kept))
-        for k in range(len(kept)):
-            if many or (~kept[k]).sum() > _OF_SENSOR * len(kept[k]) or _in_a_row(~kept[k]):
-                kept[k][:] = True
-                whole.add(k)
+        # One that fits without the others was only far off beside them; once, or there is no end.
+        fits = [(k, i) for k, each in enumerate(aside) for i, _, size in each if abs(size) < least]
+        fits = [] if worst else [place for place in fits if place not in back]
+        for k, i in fits:
+            kept[k][i] = True
+        back |= {*fits}
+        if not worst and not fits:
+            break
+        closed, together = _no_strays(kept, told)
+        events += together
+        for k in closed - whole:
+            kept[k][:] = True
+        whole |= closed
     rows, offs = [], np.split(found.off, ends)
-    for each, mask, misfit, off in zip(told, kept, apart, offs, strict=True):
+    for each, strays, misfit, off in zip(told, aside, apart, offs, strict=True):
         count, there = len(misfit), bool(len(misfit))
         chance = float(scipy.special.chdtrc(count, float(misfit @ misfit))) if there else 1.0
         rms, wide = (float(np.sqrt(np.mean(v**2))) if there else np.nan for v in (misfit, off))
-        aside = np.flatnonzero(~mask)
-        off_by = (each.measured - _at(found.mean, points, each.computed))[aside] / each.deviation
         rows.append(
-            Fit(each.sensor, count, aside.tolist(), off_by.tolist(), rms, chance, _alike(misfit),
-                wide)
+            Fit(each.sensor, count, [i for i, _, _ in strays], [size for _, size, _ in strays],
+                rms, chance, _alike(misfit), wide)
         )  # fmt: skip
     every = np.concatenate(apart)
     alike = np.array([row.pattern for row in rows if row.readings >= _LEAST_ROW] or [0.0])
@@ -258,18 +276,70 @@ def learn(points: Array, told: Sequence[Told]) -> Learnt:
         "pattern": float(scipy.special.ndtr(-alike.sum() / np.sqrt(len(alike)))),
         "sensor pattern": min(1.0, len(alike) * float(scipy.special.ndtr(-alike.max()))),
     }
-    return Learnt(found, rows, chances)
+    return Learnt(found, rows, chances, sorted({*events}))
 
 
-def _in_a_row(strays: Mask) -> bool:
-    """Whether too many follow each other."""
-    return any(strays[k : k + _IN_A_ROW + 1].all() for k in range(len(strays) - _IN_A_ROW))
-
-
-def _at(mean: Array, points: Array, outputs: Array) -> Array:
-    """Outputs of shape (runs, readings) at the mean, by their linear map."""
+def _set_aside(
+    found: Posterior, points: Array, told: Told, kept: Mask
+) -> list[tuple[int, float, float]]:
+    """Of each reading of a sensor that is not kept: which, how far it is from what is expected,
+    without the bias that the others tell, over its scatter, and over all that scatters there.
+    """
+    places = np.flatnonzero(~kept)
+    if not len(places):
+        return []
     known = np.column_stack([np.ones(len(points)), points])
-    return np.asarray(np.append(1.0, mean) @ np.linalg.lstsq(known, outputs, rcond=None)[0])
+    outputs = told.computed / told.deviation
+    map_, *_ = np.linalg.lstsq(known, outputs, rcond=None)
+    apart = told.measured / told.deviation - np.append(1.0, found.mean) @ map_
+    weight = kept.sum() * (told.bias / told.deviation) ** 2
+    apart = apart - weight / (1.0 + weight) * (apart[kept].mean() if kept.any() else 0.0)
+    off = ((outputs - known @ map_) ** 2).sum(axis=0) / (len(points) - known.shape[1])
+    new = np.einsum("ki,kl,li->i", map_[1:], found.covariance, map_[1:])
+    sizes = apart / np.sqrt(1.0 + new + off)
+    return [(int(i), float(apart[i]), float(sizes[i])) for i in places]
+
+
+def _no_strays(
+    kept: Sequence[Mask], told: Sequence[Told]
+) -> tuple[set[int], list[tuple[float, int]]]:
+    """Sensors whose strays are none, by where they are, and times at which several are off.
+
+    Strays are independent.  So no sensor has far more of them than the others, no row of them is
+    longer than chance makes it, nor are several sensors off at one time, with the share that is
+    found elsewhere; and all are few.
+    """
+    every, strays = sum(map(len, kept)), sum(int((~mask).sum()) for mask in kept)
+    if strays > _OF_ALL * every:
+        return {*range(len(kept))}, []
+    closed, events = set[int](), list[tuple[float, int]]()
+
+    def share(of_these: int, among: int) -> float:
+        """Of strays elsewhere; one more than there is, since none tells of no share."""
+        return min((strays - of_these + 1) / (every - among + 1), 1.0)
+
+    for k, mask in enumerate(kept):
+        count, row = int((~mask).sum()), _longest_row(~mask)
+        chance = len(kept) * scipy.stats.binom.sf(count - 1, len(mask), share(count, len(mask)))
+        many = count > _OF_SENSOR * len(mask) and chance < _UNLIKELY
+        if many or (row > _IN_A_ROW and every * share(row, row) ** row < UNEXPLAINED):
+            closed.add(k)
+    known = [np.full(len(m), np.nan) if t.times is None else t.times
+             for m, t in zip(kept, told, strict=True)]  # fmt: skip
+    moments = np.unique(np.concatenate([t[~m] for t, m in zip(known, kept, strict=True)]))
+    instants = max(map(len, kept), default=0)
+    for time in moments[np.isfinite(moments)].tolist():
+        there = [k for k, times in enumerate(known) if (times == time).any()]
+        off = [k for k in there if (~kept[k] & (known[k] == time)).any()]
+        chance = scipy.stats.binom.sf(len(off) - 1, len(there), share(len(off), len(there)))
+        if len(off) > 1 and instants * chance < UNEXPLAINED:
+            closed |= {*off}
+            events.append((time, len(off)))
+    return closed, events
+
+
+def _longest_row(strays: Mask) -> int:
+    return max((len(list(row)) for stray, row in itertools.groupby(strays) if stray), default=0)
 
 
 def _alike(misfit: Array) -> float:
@@ -336,45 +406,6 @@ def _of_any(sigma: float, count: int) -> float:
     return min(1.0, 2.0 * count * float(scipy.special.ndtr(-abs(sigma))))
 
 
-class Ranking(NamedTuple):
-    """How much sensors would tell."""
-
-    order: list[int]
-    """Of the sensors: each next one is that which adds most to those before."""
-    after: Array
-    """Posterior over prior scatter of each unknown with the first k + 1 of them, shape (sensors,
-    unknowns)."""
-    alone: Array
-    """The same with each sensor alone, in their own order."""
-
-
-def rank(points: Array, told: Sequence[Told]) -> Ranking:
-    """Sensors in the order in which they leave least of the scatter of unknowns (geometric mean).
-
-    What has been read does not matter: of a linear map the covariance is the same for any data.
-    """
-    reduced = []
-    for each in told:
-        values = each.scaled(each.computed)
-        # Turned into at most as many directions as runs: what it tells is unchanged.
-        sides, sizes, _ = np.linalg.svd(values - values.mean(axis=0), full_matrices=False)
-        reduced.append(sides * sizes)
-
-    def scatter(chosen: Sequence[int]) -> Array:
-        outputs = np.concatenate([reduced[k] for k in chosen], axis=1)
-        covariance = posterior_of(points, outputs, np.zeros(outputs.shape[1])).covariance
-        return np.asarray(np.sqrt(np.diag(covariance)))
-
-    every, order, after = range(len(told)), list[int](), list[Array]()
-    alone = np.array([scatter([k]) for k in every])
-    while len(order) < len(told):
-        left = [k for k in every if k not in order]
-        best = min(left, key=lambda k: float(np.log(scatter([*order, k])).sum()))
-        order.append(best)
-        after.append(scatter(order))
-    return Ranking(order, np.array(after), alone)
-
-
 # What a posterior says, as tables.
 
 
@@ -414,7 +445,7 @@ def calibration_tables(found: xr.Dataset) -> list[Table]:
 
 
 def _hardly(found: xr.Dataset) -> list[str]:
-    far = found["learnt"].values > _HARDLY
+    far = found["learnt"].values > HARDLY
     names = []
     for name in dict.fromkeys(str(each) for each in found["input"].values):
         own = found["input"].values == name
@@ -427,7 +458,7 @@ def _hardly(found: xr.Dataset) -> list[str]:
 
 def _together(found: xr.Dataset) -> list[str]:
     names, matrix = found["unknown"].values, found["correlation"].values
-    hardly, lines = found["learnt"].values > _HARDLY, list[str]()
+    hardly, lines = found["learnt"].values > HARDLY, list[str]()
     for one, other in zip(*np.triu_indices(len(names), 1), strict=True):
         if abs(r := matrix[one, other]) > _TOGETHER and not (hardly[one] and hardly[other]):
             how = "difference" if r > 0.0 else "sum"
@@ -478,47 +509,20 @@ def _standing_out(found: xr.Dataset) -> list[str]:
             suspect = called[int(np.flatnonzero(own["group"] > 0)[0])]
             lines.append(
                 "the prior of the others holds the value of such a place back: give each that is "
-                f"named a wide one of its own beside theirs, '{name}{suspect}' = ..., and "
-                "calibrate again"
+                f"named a wide one of its own beside theirs, '{name}{suspect}' = "
+                f"{_wide(own, suspect)}, and calibrate again"
             )
     return lines
 
 
-def sensors_table(found: xr.Dataset) -> Table:
-    """Sensors in the order in which they tell most (the dataset of ``ringsim sensors``)."""
-    names = [str(name) for name in found["unknown"].values]
-    listed = names if len(names) <= _LISTED else []
-    silent = str(found.attrs.get("silent", ""))
-    after, alone = (np.exp(np.log(found[k].values).mean(axis=1)) for k in ("learnt", "alone"))
-    rows = [
-        (str(k + 1), str(sensor), number_text(alone[k], 2), number_text(after[k], 2),
-         *(number_text(float(found["learnt"].values[k, names.index(name)]), 2) for name in listed))
-        for k, sensor in enumerate(found["sensor"].values)
-    ]  # fmt: skip
-    notes = [
-        "remaining scatter over that of the prior: of all unknowns (geometric mean) with the "
-        "sensor alone, and with all above it; of each unknown with all above it",
-        "each next sensor is the one that leaves least; about the medians of the priors",
-        *_seeming(found["sensor"].values, after),
-        *(f"hardly learnt even from all of them: {name}"
-          for name, v in zip(names, found["learnt"].values[-1], strict=True) if v > _HARDLY),
-        *filter(None, [silent and f"tell nothing, since some run has no value at any of their "
-                       f"readings: {silent}"]),
-    ]  # fmt: skip
-    return Table(("", "sensor", "alone", "together", *listed), rows, notes)
+def _wide(own: xr.Dataset, place: str) -> str:
+    """A prior for a fault: any value up to ten times the median of the others."""
+    at = np.flatnonzero([str(name).endswith(place) for name in own["unknown"].values])
+    middle = float(own["prior_quantile"][int(at[0]), 1])
+    most = f"{10.0 * middle:.2g}"
+    return f'{{ kind = "uniform", low = 0.0, high = {most} }}' if middle > 0.0 else "..."
 
 
-def _seeming(sensors: NDArray[np.str_], after: Array) -> list[str]:
-    """A line on sensors with which more seems to be left than without."""
-    worse = [str(each) for each in sensors[1:][after[1:] > _SEEMS * after[:-1]]]
-    return [
-        f"too few runs to tell how much these add, which seem to take knowledge away, as no sensor "
-        f"can: {', '.join(worse)}: raise runs"
-    ] * bool(worse)  # fmt: skip
-
-
-_SEEMS = 1.01
-"""Of what is left: less than anybody prints."""
 _WRONG = {
     "rms": "the misfits of all sensors together are larger than scatter",
     "pattern": "misfits of successive readings are alike in all sensors together",
@@ -537,6 +541,11 @@ def _verdict(found: xr.Dataset) -> list[str]:
         why = [f"{names} {many} by more than scatter"] if names else []
         why += [words for test, words in _WRONG.items()
                 if 3.0 * float(found["chance_of_all"].sel(test=test)) < UNEXPLAINED]  # fmt: skip
+        why += [
+            f"{counted(count, 'sensor')} off together at {number_text(time, 6)} "
+            f"{found.attrs.get('clock_unit', 's')}"
+            for time, count in json.loads(found.attrs.get("events", "[]"))
+        ]
         cause = (
             "no values of these unknowns near the posterior give these readings. The model lacks "
             "something, numerical errors (solver.tolerance) count, or sigma is too small"
@@ -577,11 +586,11 @@ def _verdict(found: xr.Dataset) -> list[str]:
 
 def _strays(found: xr.Dataset) -> str:
     """The readings that were set aside, those farthest off."""
-    sizes = found["stray_size"].values
-    order = np.argsort(-np.abs(sizes), kind="stable")[:_LISTED]
+    sizes, unit = found["stray_size"].values, str(found.attrs.get("clock_unit", "s"))
+    order = np.argsort(-np.abs(sizes), kind="stable")[:LISTED]
     told = [
         str(one["stray_sensor"].item())
-        + (f" at {number_text(when, 5)} s" if np.isfinite(when) else "")
+        + (f" at {number_text(when, 6)} {unit}" if np.isfinite(when) else "")
         + f" ({float(one['stray_size']):+.1f} sigma)"
         for one in (found.isel(stray=int(k)) for k in order)
         for when in [float(one["stray_time"])]

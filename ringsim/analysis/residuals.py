@@ -2,11 +2,15 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+from ringsim.analysis.posterior import HARDLY, LISTED, Told, posterior_of
 from ringsim.measured import Measurement, Readings, by_clock, is_instant
 from ringsim.outputs.family import VARIABLES, axes, holds, supply
 from ringsim.refusal import InputError, known_or_nearest, show
@@ -353,3 +357,82 @@ def _of_campaign(told: xr.Dataset) -> list[str]:
             "none of the drawn values of the inputs gives"
         )
     return notes
+
+
+# What sensors would tell of unknowns, before a test.
+
+
+class Ranking(NamedTuple):
+    """How much sensors would tell."""
+
+    order: list[int]
+    """Of the sensors: each next one is that which adds most to those before."""
+    after: Array
+    """Posterior over prior scatter of each unknown with the first k + 1 of them, shape (sensors,
+    unknowns)."""
+    alone: Array
+    """The same with each sensor alone, in their own order."""
+
+
+def rank(points: Array, told: Sequence[Told]) -> Ranking:
+    """Sensors in the order in which they leave least of the scatter of unknowns (geometric mean).
+
+    What has been read does not matter: of a linear map the covariance is the same for any data.
+    """
+    reduced = []
+    for each in told:
+        values = each.scaled(each.computed)
+        # Turned into at most as many directions as runs: what it tells is unchanged.
+        sides, sizes, _ = np.linalg.svd(values - values.mean(axis=0), full_matrices=False)
+        reduced.append(sides * sizes)
+
+    def scatter(chosen: Sequence[int]) -> Array:
+        outputs = np.concatenate([reduced[k] for k in chosen], axis=1)
+        covariance = posterior_of(points, outputs, np.zeros(outputs.shape[1])).covariance
+        return np.asarray(np.sqrt(np.diag(covariance)))
+
+    every, order, after = range(len(told)), list[int](), list[Array]()
+    alone = np.array([scatter([k]) for k in every])
+    while len(order) < len(told):
+        left = [k for k in every if k not in order]
+        best = min(left, key=lambda k: float(np.log(scatter([*order, k])).sum()))
+        order.append(best)
+        after.append(scatter(order))
+    return Ranking(order, np.array(after), alone)
+
+
+def sensors_table(found: xr.Dataset) -> Table:
+    """Sensors in the order in which they tell most (the dataset of ``ringsim sensors``)."""
+    names = [str(name) for name in found["unknown"].values]
+    listed = names if len(names) <= LISTED else []
+    silent = str(found.attrs.get("silent", ""))
+    after, alone = (np.exp(np.log(found[k].values).mean(axis=1)) for k in ("learnt", "alone"))
+    rows = [
+        (str(k + 1), str(sensor), number_text(alone[k], 2), number_text(after[k], 2),
+         *(number_text(float(found["learnt"].values[k, names.index(name)]), 2) for name in listed))
+        for k, sensor in enumerate(found["sensor"].values)
+    ]  # fmt: skip
+    notes = [
+        "remaining scatter over that of the prior: of all unknowns (geometric mean) with the "
+        "sensor alone, and with all above it; of each unknown with all above it",
+        "each next sensor is the one that leaves least; about the medians of the priors",
+        *_seeming(found["sensor"].values, after),
+        *(f"hardly learnt even from all of them: {name}"
+          for name, v in zip(names, found["learnt"].values[-1], strict=True) if v > HARDLY),
+        *filter(None, [silent and f"tell nothing, since some run has no value at any of their "
+                       f"readings: {silent}"]),
+    ]  # fmt: skip
+    return Table(("", "sensor", "alone", "together", *listed), rows, notes)
+
+
+def _seeming(sensors: NDArray[np.str_], after: Array) -> list[str]:
+    """A line on sensors with which more seems to be left than without."""
+    worse = [str(each) for each in sensors[1:][after[1:] > _SEEMS * after[:-1]]]
+    return [
+        f"too few runs to tell how much these add, which seem to take knowledge away, as no sensor "
+        f"can: {', '.join(worse)}: raise runs"
+    ] * bool(worse)  # fmt: skip
+
+
+_SEEMS = 1.01
+"""Of what is left: less than anybody prints."""

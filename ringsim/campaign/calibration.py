@@ -1,5 +1,6 @@
 """Unknown inputs from the measured data of a test: stages of campaigns, and what they tell."""
 
+import contextlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -22,9 +23,8 @@ from ringsim.analysis.posterior import (
     contrasts,
     explained,
     learn,
-    rank,
 )
-from ringsim.analysis.residuals import check_sensors, predictions
+from ringsim.analysis.residuals import check_sensors, predictions, rank
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, listed_cases, require_no_launcher, start
@@ -234,8 +234,6 @@ class _Course:
     stages: list[Learnt] = field(default_factory=list)
     told: list[Told] = field(default_factory=list)
     """Of the last stage."""
-    times: list[Array] = field(default_factory=list)
-    """Of its readings, by the clock of the run, s."""
     points: list[Array] = field(default_factory=list)
     """Of each stage that was ordered."""
     lost: list[int] = field(default_factory=list)
@@ -260,18 +258,19 @@ class _Course:
             points = scipy.special.ndtri(inside(even))
             if self.planning:
                 points[0] = 0.0
-        self.points.append(points)
         stages = given.budget.stages
         name, title = f"stage-{number + 1}", f"stage {number + 1} of {stages}"
         if not number:
             # What an earlier call has found is not what this one finds.
             (self.folder / (SENSORS if self.planning else POSTERIOR)).unlink(missing_ok=True)
+        scene = given.campaign.scene.with_values({"record.interval": _interval(given)})
         try:
+            points = self._accepted(points, unknowns, scene)
+            self.points.append(points)
             campaign = listed_cases(
-                self.folder, name,
-                given.campaign.scene.with_values({"record.interval": _interval(given)}),
-                unknowns.cases(points), title=f"{asked.title or asked.name}: {title}",
-                limits=asked.limits, fidelity=asked.fidelity,
+                self.folder, name, scene, unknowns.cases(points),
+                title=f"{asked.title or asked.name}: {title}", limits=asked.limits,
+                fidelity=asked.fidelity,
             )  # fmt: skip
         except InputError as error:
             cure = "truncate the prior that gives it"
@@ -280,6 +279,22 @@ class _Course:
             raise InputError(f"{given.campaign.file.name}: {title}: {error}: {cure}") from None
         last = number + 1 == stages
         return Order(campaign, self.folder / name, more=not last, brief=True)
+
+    def _accepted(self, points: Array, unknowns: Unknowns, scene: Scene) -> Array:
+        """Points of a stage whose values the scene takes: where the map of a wide ensemble has
+        overshot, nearer to the middle of the one before, or of the priors.
+        """
+        if not self.stages:
+            return points
+        before = self.stages[-2].posterior.mean if len(self.stages) > 1 else 0.0
+        step = self.stages[-1].posterior.mean - before
+        for nearer in (0.0, 0.5, 0.75, 0.875):
+            moved = points - nearer * step
+            with contextlib.suppress(InputError):
+                for values in unknowns.cases(moved):
+                    scene.with_values(values)
+                return np.asarray(moved)
+        return points  # is refused, in words
 
     def then(self, folder: Path) -> None:
         """Learn from the last stage, unless runs are missing, and write what all have told."""
@@ -309,7 +324,7 @@ class _Course:
             if well[0] != 0:
                 raise InputError(f"{name}: the run at the medians of all unknowns failed")
             self.nominal = [values[0] for values in every]
-        self.told, self.times, self.unused = [], [], 0
+        self.told, self.unused = [], 0
         for k, (readings, values) in enumerate(
             zip(self.given.measurement.readings, every, strict=True)
         ):
@@ -317,8 +332,8 @@ class _Course:
             there = np.isfinite(values).all(axis=0) & np.isfinite(measured)
             self.unused += int((~there).sum())
             self.told.append(Told(readings.sensor.name, values[:, there], measured[there],
-                                  readings.deviation, readings.bias_deviation))  # fmt: skip
-            self.times.append(readings.times[there])
+                                  readings.deviation, readings.bias_deviation,
+                                  readings.times[there]))  # fmt: skip
         if not any(len(each.measured) for each in self.told):
             raise InputError(
                 f"{name}: no reading lies within all runs: check clock.offset of the measured data "
@@ -388,7 +403,7 @@ def _write_posterior(course: _Course) -> None:
     well = explained([fit.chance for fit in last.fits], [*last.chances.values()])
     test = given.measurement.file.name + " (NOT EXPLAINED: intervals too narrow)" * (not well)
     laws = [
-        _moved(axis, m, s, test)
+        axis.moved(m, s, test)
         for axis, m, s in zip(unknowns.axes, mean.tolist(), deviation.tolist(), strict=True)
     ]
     per_unknown, per_sensor, per_stage = ("unknown",), ("sensor",), ("stage",)
@@ -414,8 +429,8 @@ def _write_posterior(course: _Course) -> None:
         "readings": (per_sensor, [fit.readings for fit in last.fits], "readings that were used"),
         "strays": (per_sensor, [len(fit.strays) for fit in last.fits],
                    "readings that were set aside"),
-        "stray_time": (("stray",), _stray_times(course), "time of a reading that was set aside, by "
-                       "its own clock (s)"),
+        "stray_time": (("stray",), _stray_times(course), "time of a reading that was set aside, as "
+                       "its table has it (clock_unit)"),
         "stray_size": (("stray",), [size for fit in last.fits for size in fit.stray_sizes],
                        "that reading less what is expected, over the scatter of a reading"),
         "chance": (per_sensor, [fit.chance for fit in last.fits], "probability of so large an rms "
@@ -441,12 +456,15 @@ def _write_posterior(course: _Course) -> None:
     pairs = [{"between": [names[i], names[j]], "coefficient": float(held[i, j])}
              for i in own for j in own if i < j]  # fmt: skip
     says = {names[k]: laws[k].model_dump(exclude_none=True) for k in own}
+    clock = given.measurement.file.clock
     attributes = {
         "title": asked.title or asked.name, "question": asked.question, "seed": asked.seed,
         "runs": given.members * len(course.stages), "stages": len(course.stages),
         "scene": given.campaign.scene.to_toml(), "fidelity": asked.fidelity,
         "measured": given.measurement.file.name, "inputs": json.dumps(says),
         "clock": json.dumps(_clock_found(given, names, laws)),
+        "clock_unit": clock.unit if clock else "s",
+        "events": json.dumps([[clock.shown(t) if clock else t, n] for t, n in last.events]),
         "correlations": json.dumps(pairs), **build.provenance(),
     }  # fmt: skip
     path = course.folder / POSTERIOR
@@ -482,23 +500,11 @@ def _clock_found(given: Given, names: list[str], laws: list[Calibrated]) -> dict
 
 
 def _stray_times(course: _Course) -> list[float]:
-    """When readings were taken that are set aside, by the clock of the measured table, s."""
+    """When readings were taken that are set aside, as the measured table says it."""
+    of = zip(course.stages[-1].fits, course.told, strict=True)
+    times = [float(told.times[k]) for fit, told in of if told.times is not None for k in fit.strays]
     clock = course.given.measurement.file.clock
-    start, rate = (0.0, 0.0) if clock is None else (clock.offset, clock.drift)
-    of = zip(course.stages[-1].fits, course.times, strict=True)
-    return [float((times[k] - start) / (1.0 + rate)) for fit, times in of for k in fit.strays]
-
-
-def _moved(axis: Axis, mean: float, deviation: float, test: str) -> Calibrated:
-    """The prior of an axis moved and narrowed; of one that an earlier test has moved, by both."""
-    before, shift, scatter = axis.law, 0.0, 1.0
-    if isinstance(before, Calibrated):
-        shift, scatter, test = before.shift, before.remaining_scatter, f"{before.data}, {test}"
-    return Calibrated(
-        of=before.of if isinstance(before, Calibrated) else before,
-        shift=shift + scatter * mean, remaining_scatter=scatter * deviation, data=test,
-        shared=axis.shared,
-    )  # fmt: skip
+    return times if clock is None else [clock.shown(time) for time in times]
 
 
 def _write_sensors(course: _Course) -> None:

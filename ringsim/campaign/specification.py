@@ -28,7 +28,7 @@ from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
 from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, axes, holds, supply
-from ringsim.overrides import flat
+from ringsim.overrides import flat, with_number
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Correlation, Table
 from ringsim.sampling.designs import Design
@@ -425,6 +425,20 @@ def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str], dict
     return source.file, list(found), clocks
 
 
+def _as_drawn(pair: Correlation, inputs: Mapping[str, Any], scene: Scene) -> Correlation:
+    """A correlation whose places are called as they are drawn: by their names, or their numbers."""
+    called = {with_number(scene, name): name for name in inputs if "." in name}
+
+    def own(name: str) -> str:
+        number = name
+        with contextlib.suppress(InputError):
+            number = with_number(scene, name)
+        return name if name in inputs else called.get(number, number)
+
+    first, second = pair.between
+    return pair.model_copy(update={"between": (own(first), own(second))})
+
+
 def _median(law: Distribution) -> Any:
     return plain(law.quantile(np.array([0.5]))[0])
 
@@ -529,9 +543,10 @@ def campaign_of(
         )
     try:
         inputs = with_own_places(varied, specification.inputs)
+        pairs = [_as_drawn(pair, inputs, varied) for pair in specification.correlations]
     except InputError as error:
         raise InputError(f"{path.name}: {error}") from None
-    specification = specification.model_copy(update={"inputs": inputs})
+    specification = specification.model_copy(update={"inputs": inputs, "correlations": pairs})
     own_outputs, has = specification.outputs, holds(varied)
     derived.require_places(own_outputs, axes(varied), path.name)
     wanted = {f"outputs.{n}": one for n, each in own_outputs.items() for one in each.names}

@@ -279,7 +279,7 @@ def sensors_command(
     place of the table.  Lists the sensors in the order in which they add most, with what is then
     left of the scatter of each unknown; writes sensors.nc.
     """
-    from ringsim.analysis.posterior import sensors_table
+    from ringsim.analysis.residuals import sensors_table
 
     return _course(
         file, settings, out, workers, lambda d: [sensors_table(d)], planning=True, dry_run=dry_run

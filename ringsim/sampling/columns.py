@@ -272,6 +272,17 @@ class Axis:
     shared: tuple[str, ...] = ()
     """Scene paths that all take it, if not the name alone."""
 
+    def moved(self, mean: float, deviation: float, test: str) -> Calibrated:
+        """The prior moved and narrowed; of one that an earlier test has moved, by both."""
+        before, shift, scatter = self.law, 0.0, 1.0
+        if isinstance(before, Calibrated):
+            shift, scatter, test = before.shift, before.remaining_scatter, f"{before.data}, {test}"
+        return Calibrated(
+            of=before.of if isinstance(before, Calibrated) else before,
+            shift=shift + scatter * mean, remaining_scatter=scatter * deviation, data=test,
+            shared=self.shared,
+        )  # fmt: skip
+
 
 def alike(axes: dict[str, Axis]) -> dict[str, Axis]:
     """Axes, of which those with priors of their own are no places among others."""

@@ -200,7 +200,7 @@ def with_own_places(base: Scene, inputs: Mapping[str, Distribution]) -> dict[str
     by_place = dict[str, dict[str, Distribution]]()
     for name, law in inputs.items():
         alone = {with_number(base, p): p for p in inputs if p.startswith(f"{name}[")}
-        if not (law.each_section and alone) or law.shared:
+        if not (law.each_section and alone) or law.shared or law.follows:
             continue
         every = [f"{name}{place}" for place in _places(base, name, law)]
         if alone.keys() & {*every}:
@@ -208,6 +208,13 @@ def with_own_places(base: Scene, inputs: Mapping[str, Distribution]) -> dict[str
             called = [f'{name}["{each}"]' for each in pulleys_at(base, name)] or every
             own = [alone.get(p, word) for p, word in zip(every, called, strict=True)]
             by_place[name] = {path: inputs.get(path, bare) for path in own}
+    for name, law in inputs.items():
+        if law.follows in by_place:
+            own = next(path for path in by_place[law.follows] if path in inputs)
+            raise InputError(
+                f"inputs: {name} follows {law.follows}, of which {own} has a distribution of its "
+                f"own: let {name} follow one place, or leave out {own}"
+            )
     moved = {path for places in by_place.values() for path in places}
     found = dict[str, Distribution]()
     for name, law in inputs.items():

@@ -19,6 +19,7 @@ from click.testing import CliRunner
 from loops import for_each
 
 import ringsim
+import ringsim.campaign.calibration as calibration
 from ringsim import simulation
 from ringsim.analysis.posterior import calibration_tables
 from ringsim.analysis.residuals import clock_line, residual_statistics, residuals
@@ -403,6 +404,29 @@ def test_pulley_with_a_prior_of_its_own_is_measured(tmp_path):
     judged = np.isfinite(tables["two"]["contrast"].values)
     assert judged.tolist() == [True, True, False, True, True, True, True, True]
     assert not (tables["two"]["group"] > 0).any()
+
+
+def test_a_stage_that_has_overshot_begins_nearer_to_the_one_before(tmp_path, monkeypatch):
+    """Where the middle of the next one is nothing that a ring can have."""
+    write_test(tmp_path, TRUTH)
+    file = write_file(tmp_path)
+    right = calibration.learn
+    stages = []
+
+    def overshot(points, told):
+        found = right(points, told)
+        stages.append(points)
+        if len(stages) == 1:  # 14 sigma: a ratio of Poisson of 0.75, half of it scatters beyond 0.5
+            mean = found.posterior.mean.copy()
+            mean[2] = 14.0
+            return found._replace(posterior=found.posterior._replace(mean=mean))
+        return found
+
+    monkeypatch.setattr(calibration, "learn", overshot)
+    posterior = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / "out")
+    assert stages[1][:, 2].mean() == pytest.approx(3.5, abs=0.8)
+    assert "stage-2" in {each.name for each in (tmp_path / "out").iterdir()}
+    assert posterior.attrs["runs"] == 48
 
 
 # What stands on it.

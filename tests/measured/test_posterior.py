@@ -16,9 +16,8 @@ from ringsim.analysis.posterior import (
     explained,
     learn,
     posterior_of,
-    rank,
-    sensors_table,
 )
+from ringsim.analysis.residuals import rank, sensors_table
 
 pytestmark = pytest.mark.quick
 
@@ -155,6 +154,87 @@ def test_two_strays_of_a_short_sensor_are_set_aside_and_three_in_a_row_are_not()
     every = run(*made([(k, 30.0) for k in (1, 12, 23, 34, 38)]), 4)  # an eighth of all readings
     assert not any(fit.strays for fit in every.fits)
     assert told_wrong(every)
+
+
+def leverage_of_the_first(seed, size=0.0):
+    """Two sensors; the first reading of the second one alone tells the last unknown."""
+    slope, stream = slopes(seed), np.random.default_rng([seed, 31])
+    slope[:, -1] *= 0.05
+    slope[20, -1] = 1.5
+    truth = stream.standard_normal(UNKNOWNS)
+    data = slope @ truth + stream.standard_normal(READINGS)
+    data[20] += size
+    return slope, data, truth
+
+
+def test_a_stray_that_the_posterior_follows_is_found_by_what_is_left_of_its_scatter():
+    held, found = [], 0
+    for seed in range(60):
+        slope, data, truth = leverage_of_the_first(seed, 15.0 * (-1) ** seed)
+        one = run(slope, data, 2)
+        found += [fit.strays for fit in one.fits] == [[], [0]]
+        assert not told_wrong(one)
+        scatter = np.sqrt(np.diag(one.posterior.covariance))
+        held += (np.abs(truth - one.posterior.mean) < 1.645 * scatter).tolist()
+    assert found >= 55
+    assert 0.85 < np.mean(held) < 0.95
+    sound = [run(*leverage_of_the_first(seed)[:2], 2) for seed in range(60)]
+    assert sum(len(fit.strays) for one in sound for fit in one.fits) <= 4  # expected: 0.6
+
+
+def test_readings_that_were_only_far_off_beside_a_stray_are_put_back():
+    """In 200 tests with three strays each none of the others stays aside but by chance."""
+    others = 0
+    for seed in range(200):
+        stream = np.random.default_rng([seed, 41])
+        slope, data = made(seed=seed)
+        wrong = stream.choice(READINGS, 3, replace=False)
+        data[wrong] += stream.choice([-1, 1], 3) * stream.uniform(10, 60, 3)
+        aside = [k + 20 * n for n, fit in enumerate(run(slope, data, 2).fits) for k in fit.strays]
+        others += len({*aside} - {*wrong.tolist()})
+    assert others <= 8  # expected: 2
+
+
+def test_sensors_that_are_off_at_one_time_are_no_strays_and_told():
+    """Six of eight sensors; at times of their own the same readings are strays."""
+    slope, stream = slopes(readings=160), np.random.default_rng(9)
+    clean = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(160)
+    times = np.arange(20) * 0.5
+    for moments, event in (([7] * 6, True), ([1, 4, 7, 10, 13, 16], False)):
+        data = clean.copy()
+        for sensor, moment in enumerate(moments):
+            data[20 * sensor + moment] += 9.0
+        told = lambda y, d=data: [  # noqa: E731
+            each._replace(times=times) for each in sensors(y, d, 8)
+        ]
+        found = staged(lambda u: u @ slope.T, told, UNKNOWNS, 200)
+        assert told_wrong(found) == event
+        assert found.events == ([(3.5, 6)] if event else [])
+        assert sum(len(fit.strays) for fit in found.fits) == (0 if event else 6)
+
+
+def test_rows_that_chance_makes_in_long_sensors_are_strays():
+    """3 % of 4,000 readings: three in a row somewhere are to be expected."""
+    stream = np.random.default_rng(12)
+    slope = slopes(readings=4000)
+    data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(4000)
+    wrong = stream.random(4000) < 0.03
+    wrong[1000:1003] = True
+    data[wrong] += stream.choice([-1, 1], wrong.sum()) * stream.uniform(10, 60, wrong.sum())
+    found = run(slope, data, 4)
+    assert not told_wrong(found)
+    assert sum(len(fit.strays) for fit in found.fits) == pytest.approx(wrong.sum(), abs=3)
+
+
+def test_strays_of_a_sensor_with_a_bias_are_so_far_off_as_they_are_beside_it():
+    slope, data = made()
+    data[20:] += 6.0  # the bias of the second sensor
+    data[[25, 33]] += 40.0, -40.0
+    told = lambda y: sensors(y, data, 2, 1.0, 8.0)  # noqa: E731
+    found = staged(lambda u: u @ slope.T, told, UNKNOWNS, 200)
+    (second,) = found.fits[1:]
+    assert second.strays == [5, 13]
+    np.testing.assert_allclose(second.stray_sizes, [40.0, -40.0], atol=4.0)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.03])
