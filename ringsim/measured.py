@@ -262,8 +262,14 @@ def load_measured(path: str | Path, *, planned: bool = False) -> Measurement:
         If a file is missing or refused, a cell is no number, or the clock stands or jumps back.
     """
     path = Path(path)
+    table = parse_toml(read_text(path), path.name)
+    if "scene" in table:
+        raise InputError(
+            f"{path.name}: scene: this is no measured data, but a file that runs a scene: give the "
+            "file of the readings, as its key measured names it"
+        )
     try:
-        file = Measured.model_validate(parse_toml(read_text(path), path.name))
+        file = Measured.model_validate(table)
     except ValidationError as error:
         raise InputError(explain(error, Measured, path.name)) from None
     if file.planned and not planned:

@@ -349,7 +349,8 @@ def _of_campaign(told: xr.Dataset) -> list[str]:
         "in the band that holds 90 % of the samples, with the scatter of a reading",
         f"all sensors: {round(share * compared.sum())} of "
         f"{counted(int(compared.sum()), 'reading')} ({number_text(share, 2)}) lie in it; far less "
-        "than 0.9 says that the inputs scatter too little, or about wrong values",
+        "than 0.9 says that the inputs scatter too little, or about wrong values, or that the "
+        "clock is off",
     ]
     if beyond := int(told["beyond_samples"].sum()):
         notes.append(

@@ -267,10 +267,11 @@ class _Course:
         try:
             points = self._accepted(points, unknowns, scene)
             self.points.append(points)
+            middle = {k: float(np.median(v)) for k, v in unknowns.values(points).items()}
             campaign = listed_cases(
                 self.folder, name, scene, unknowns.cases(points),
                 title=f"{asked.title or asked.name}: {title}", limits=asked.limits,
-                fidelity=asked.fidelity,
+                fidelity=asked.fidelity, clocks=_clocks(given, middle),
             )  # fmt: skip
         except InputError as error:
             cure = "truncate the prior that gives it"
@@ -457,12 +458,14 @@ def _write_posterior(course: _Course) -> None:
              for i in own for j in own if i < j]  # fmt: skip
     says = {names[k]: laws[k].model_dump(exclude_none=True) for k in own}
     clock = given.measurement.file.clock
+    half = np.array([0.5])
+    medians = {n: float(law.quantile(half)[0]) for n, law in zip(names, laws, strict=True)}
     attributes = {
         "title": asked.title or asked.name, "question": asked.question, "seed": asked.seed,
         "runs": given.members * len(course.stages), "stages": len(course.stages),
         "scene": given.campaign.scene.to_toml(), "fidelity": asked.fidelity,
         "measured": given.measurement.file.name, "inputs": json.dumps(says),
-        "clock": json.dumps(_clock_found(given, names, laws)),
+        "clocks": json.dumps(_clocks(given, medians)),
         "clock_unit": clock.unit if clock else "s",
         "events": json.dumps([[clock.shown(t) if clock else t, n] for t, n in last.events]),
         "correlations": json.dumps(pairs), **build.provenance(),
@@ -488,15 +491,14 @@ def _write_posterior(course: _Course) -> None:
             made.setncatts({"long_name": meaning, "units": "1"})
 
 
-def _clock_found(given: Given, names: list[str], laws: list[Calibrated]) -> dict[str, list[float]]:
-    """Offset and drift of the measured clock before and after; empty if they were no unknowns."""
+def _clocks(given: Given, medians: Mapping[str, float]) -> dict[str, dict[str, list[float]]]:
+    """By the test's name offset and drift of its clock, in its file and as found; or nothing."""
     clock = given.measurement.file.clock
-    own = {name: law for name, law in zip(names, laws, strict=True) if name.startswith("clock.")}
-    medians = {name[6:]: float(law.quantile(np.array([0.5]))[0]) for name, law in own.items()}
-    if clock is None or not medians:
+    if clock is None or not any(name.startswith("clock.") for name in medians):
         return {}
     before = {"offset": clock.offset, "drift": clock.drift}
-    return {name: [was, medians.get(name, was)] for name, was in before.items()}
+    found = {n: [was, medians.get(f"clock.{n}", was)] for n, was in before.items()}
+    return {given.measurement.file.name: found}
 
 
 def _stray_times(course: _Course) -> list[float]:

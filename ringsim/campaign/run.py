@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -511,9 +512,11 @@ def run_cases(
 
 def listed_cases(
     folder: Path, name: str, scene: Scene, cases: Sequence[Mapping[str, Any]], *, title: str,
-    limits: Allowance, fidelity: str,
+    limits: Allowance, fidelity: str, clocks: Mapping[str, Any] = MappingProxyType({}),
 ) -> Campaign:  # fmt: skip
-    """The campaign of these cases, prepared in ``folder``/``name``; see :func:`run_cases`."""
+    """The campaign of these cases, prepared in ``folder``/``name``; see :func:`run_cases`, and for
+    the ``clocks`` of tests ``Campaign``.
+    """
     paths, listed = list(cases[0]), io.StringIO()
     writer = csv.DictWriter(listed, paths, lineterminator="\n")
     writer.writeheader()
@@ -537,7 +540,7 @@ def listed_cases(
     with tempfile.TemporaryDirectory(prefix="ringsim-cases-") as drafts:
         for each, text in texts.items():
             write_text(Path(drafts) / each, text)
-        campaign = load_campaign(Path(drafts) / file)
+        campaign = replace(load_campaign(Path(drafts) / file), clocks=clocks)
         prepare_folder(campaign, folder / name, solver=SOLVERS[fidelity])
     for each, text in texts.items():
         write_text(folder / each, text)

@@ -210,10 +210,10 @@ def with_own_places(base: Scene, inputs: Mapping[str, Distribution]) -> dict[str
             by_place[name] = {path: inputs.get(path, bare) for path in own}
     for name, law in inputs.items():
         if law.follows in by_place:
-            own = next(path for path in by_place[law.follows] if path in inputs)
+            alone_ = next(path for path in by_place[law.follows] if path in inputs)
             raise InputError(
-                f"inputs: {name} follows {law.follows}, of which {own} has a distribution of its "
-                f"own: let {name} follow one place, or leave out {own}"
+                f"inputs: {name} follows {law.follows}, of which {alone_} has a distribution of "
+                f"its own: let {name} follow one place, or leave out {alone_}"
             )
     moved = {path for places in by_place.values() for path in places}
     found = dict[str, Distribution]()
@@ -251,8 +251,7 @@ def learnt_from(
     require_regular(file)
     try:
         with netCDF4.Dataset(file) as data:
-            words = {n: getattr(data, n, "") for n in ("inputs", "correlations", "clock")}
-            test = getattr(data, "measured", "")
+            words = {n: getattr(data, n, "") for n in ("inputs", "correlations", "clocks")}
     except OSError as error:
         raise InputError(f"inputs.from: {file.name} cannot be read: {error}") from None
     if not words["correlations"]:
@@ -267,9 +266,8 @@ def learnt_from(
                 f"({known_or_nearest(name, inputs)})"
             )
     left = {name: law for name, law in inputs.items() if name not in without}
-    clock = json.loads(words["clock"] or "{}")
     pairs = [pair for pair in pairs if all(name in left for name in pair["between"])]
-    return left, pairs, {test: clock} if clock else {}
+    return left, pairs, json.loads(words["clocks"] or "{}")
 
 
 def first_inside(path: str, others: Iterable[str]) -> str:

@@ -317,6 +317,12 @@ def _nearest_file(path: Path) -> str:
     return str(path.parent / near[0]) if near else ""
 
 
+_VERBS = {"measured": "calibration", "variables": "optimisation", "design": "campaign",
+          "inputs": "campaign"}  # fmt: skip
+"""Keys that scenes have not, and the kind of file that has them."""
+_COMMANDS = {"calibration": "calibrate", "optimisation": "optimise", "campaign": "campaign"}
+
+
 def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
     """A built-in scene by name, or a scene file; paths are relative to the folder of ``beside``.
 
@@ -337,10 +343,15 @@ def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
         hint = f"did you mean {near}?" if near else known_or_nearest(name, builtin)
         raise InputError(f"{path}: no such file, and no built-in scene of that name ({hint})")
     table = parse_toml(read_text(path), path.name)
-    if key := next((key for key in ("design", "inputs") if key in table), ""):
+    if "sensors" in table:
         raise InputError(
-            f"{path.name}: {key}: this is a campaign file, not a scene: run it with ringsim "
-            "campaign (--dry-run only checks it), or give the scene that it names"
+            f"{path.name}: sensors: this is measured data, not a scene: lay it beside a run by "
+            f"ringsim compare RUN {path.name}"
+        )
+    if key := next((key for key in _VERBS if key in table), ""):
+        raise InputError(
+            f"{path.name}: {key}: this is a {_VERBS[key]} file, not a scene: run it with ringsim "
+            f"{_COMMANDS[_VERBS[key]]} (--dry-run only checks it), or give the scene that it names"
         )
     if named := extensions.names_in(table):
         table["imports"] = extensions.located(named, path.parent)

@@ -295,6 +295,11 @@ def test_clock_of_the_stand_is_found_too(tmp_path):
     stand = load_measured(tmp_path / "stand.toml")
     rms = residual_statistics(residuals(drawn, stand)).attrs["rms_in_deviations"]
     assert rms == pytest.approx(1.0, abs=0.35)
+    with xr.open_dataset(tmp_path / "out" / "stage-3" / "campaign.nc") as last:  # its own ensemble
+        beside = residual_statistics(residuals(last, stand)).attrs["rms_in_deviations"]
+        last.attrs.pop("clocks")
+        without = residual_statistics(residuals(last, stand)).attrs["rms_in_deviations"]
+    assert beside < 0.5 * without  # by the median of 16 clocks
     unknown = drawn.copy()
     unknown.attrs.pop("clocks")
     assert residual_statistics(residuals(unknown, stand)).attrs["rms_in_deviations"] > 10.0
@@ -541,6 +546,15 @@ def test_files_of_other_verbs_are_told(file, words):
     done = CliRunner().invoke(cli, ["calibrate", str(STAND.parent / file)])
     assert done.exit_code == 2
     assert words in done.output
+    ran = CliRunner().invoke(cli, ["run", str(STAND / "measured.toml")])
+    assert ran.exit_code == 2
+    assert "sensors: this is measured data, not a scene" in ran.output
+    ran = CliRunner().invoke(cli, ["check", str(STAND / "friction.toml")])
+    assert "measured: this is a calibration file, not a scene: run it with ringsim calibrate" in (
+        ran.output
+    )
+    with pytest.raises(InputError, match="scene: this is no measured data"):
+        load_measured(STAND / "friction.toml")
     optimised = CliRunner().invoke(cli, ["optimise", str(STAND / "friction.toml")])
     assert optimised.exit_code == 2
     assert "measured: this is no optimisation file: run it with ringsim calibrate" in (
