@@ -409,11 +409,13 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
             yield f"{plane} plane alone: its winch starts later, not included here"
             continue
         least = PlaneMargin(both, number).least()
-        whole = both.at(least.angle).available
-        share = f"{100.0 * least.available / whole:.3g}" if whole > 0.0 else "0"
+        whole = both.at(least.angle)
+        counts = whole.required > 0.0 and whole.margin > -1.0
+        share = 50.0 * (1.0 + least.margin) / (1.0 + whole.margin) if counts else 0.0
         yield (
-            f"{plane} plane alone: its cable, with half of springs and loads, gives {share} % of "
-            f"what drives, against half of what resists: {_verdict(least)}"
+            f"{plane} plane alone: its cable, with half of springs and loads, gives {share:.3g} % "
+            f"of what drives with the standard's factors, against half of what resists: "
+            f"{_verdict(least)}"
         )
 
 

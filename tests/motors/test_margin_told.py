@@ -150,6 +150,22 @@ def test_a_dead_winch_is_told_beside_a_strong_one(scene: Scene, tmp_path: Path) 
     assert "both planes are equal" in told(tmp_path / "even.toml", scene)
 
 
+def test_the_share_of_a_plane_is_of_what_the_standard_counts(scene: Scene, tmp_path: Path) -> None:
+    """And not of what the cables would give without friction, of which both have about half."""
+    rough = scene.with_values({"cables.upper.friction.coefficient": 2.5e-3})
+    text = told(tmp_path / "rough.toml", rough)
+    (share, margin, angle), *_ = re.findall(
+        r"^  upper plane alone: .* gives (\S+) % of .* least margin (\S+) at (\S+) deg", text, re.M
+    )
+    at = DriveMargin(rough, EcssMechanisms()).at(np.radians(float(angle)))
+    own, other = at.pulls[1]
+    loads = at.driving["loads"]
+    counted = 100.0 * (own + 0.5 * loads) / (own + other + loads)
+    assert counted < 40.0
+    assert float(share) == pytest.approx(counted, rel=0.01)
+    assert float(margin) == pytest.approx((2.0 * own + loads) / at.required - 1.0, abs=2e-3)
+
+
 def test_the_cable_of_a_winch_that_starts_later_has_no_margin_yet(
     scene: Scene, tmp_path: Path
 ) -> None:
