@@ -23,9 +23,10 @@ import io
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
 from ringsim.files import parse_toml, read_text, require_regular
@@ -71,9 +72,9 @@ class Clock(Model):
     drift: Annotated[float, Field(ge=-0.1, le=0.1), Unit("1")] = 0.0
     """By how much the time of the run goes faster than the clock."""
 
-    def shown(self, time: float) -> float:
-        """A time of the run (s) as the clock shows it, in its unit."""
-        return (time - self.offset) / (1.0 + self.drift) / _UNITS["s"][self.unit]
+    def shown(self, times: Array) -> Array:
+        """Times of the run (s) as the clock shows them, in its unit."""
+        return np.asarray((times - self.offset) / (1.0 + self.drift) / _UNITS["s"][self.unit])
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -233,6 +234,42 @@ class Measurement:
     readings: tuple[Readings, ...]
 
 
+class Told(NamedTuple):
+    """What one sensor has read, and would have read in each run."""
+
+    sensor: str
+    computed: Array
+    """Shape (runs, readings)."""
+    measured: Array
+    """Shape (readings,)."""
+    deviation: float
+    """Standard deviation of one reading."""
+    bias: float = 0.0
+    """That of what all readings of the sensor have in common."""
+    times: Array | None = None
+    """Of the readings, by their own clock; NaN for what has none."""
+
+    def only(self, kept: NDArray[np.bool_]) -> "Told":
+        """The readings that are kept, shape (readings,) of true and false."""
+        times = None if self.times is None else self.times[kept]
+        return self._replace(
+            computed=self.computed[:, kept], measured=self.measured[kept], times=times
+        )
+
+    def scaled(self, values: Array) -> Array:
+        """Values of the readings, shape (..., readings), over their scatter.
+
+        With a common bias their covariance is s^2 (1 + r 11'), r = (bias / s)^2; its inverse root
+        is (1 - (1 - 1 / sqrt(1 + n r)) 11' / n) / s.
+        """
+        count = values.shape[-1]
+        share = 1.0 - 1.0 / np.sqrt(1.0 + count * (self.bias / self.deviation) ** 2)
+        return np.asarray(
+            (values - share * values.mean(axis=-1, keepdims=True) if count else values)
+            / self.deviation
+        )
+
+
 def by_clock(measurement: Measurement, offset: float, drift: float) -> Measurement:
     """The same readings by another clock."""
     old = measurement.file.clock
@@ -263,10 +300,10 @@ def load_measured(path: str | Path, *, planned: bool = False) -> Measurement:
     """
     path = Path(path)
     table = parse_toml(read_text(path), path.name)
-    if "scene" in table:
+    if other := next((key for key in ("scene", "structure") if key in table), ""):
         raise InputError(
-            f"{path.name}: scene: this is no measured data, but a file that runs a scene: give the "
-            "file of the readings, as its key measured names it"
+            f"{path.name}: {other}: this is no measured data, but a scene or what runs one: give "
+            "the file that describes the readings, with sensors"
         )
     try:
         file = Measured.model_validate(table)

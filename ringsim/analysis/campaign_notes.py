@@ -129,24 +129,23 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
     """
     if "reason" not in campaign:
         return []
-    found: dict[str, list[tuple[int, str]]] = {}
-    first: dict[str, list[tuple[int, str]]] = {}
+    found, first = dict[str, dict[int, str]](), dict[str, dict[int, str]]()
     held, reasons = good(campaign), campaign["reason"].to_numpy()
     for sample in np.flatnonzero(held).tolist():
         reason, *remarks = str(reasons[sample]).split("; ")
-        first.setdefault(_kind(reason), []).append((sample, reason))
+        first.setdefault(_kind(reason), {})[sample] = reason
         for remark in remarks:
             if may_be_off(f"; {remark}")[0] or remark.startswith(_LATE):
                 continue
             remark = remark.replace("start 1: ", "first attempt, not used: ", 1)
             if remark.count(")") > remark.count("("):  # which the words before it have opened
                 remark = remark.removesuffix(")")
-            found.setdefault(_kind(remark), []).append((sample, remark))
-    found = {kind: sorted(own + first.get(kind, [])) for kind, own in found.items()}
+            found.setdefault(_kind(remark), {}).setdefault(sample, remark)
+    whole = [sorted((own | first.get(kind, {})).items()) for kind, own in found.items()]
     every = int(held.sum())
     return [
         f"in {_of(len(own), every)}, for example in sample {own[0][0]}: {own[0][1]}"
-        for own in sorted(found.values(), key=len, reverse=True)
+        for own in sorted(whole, key=len, reverse=True)
     ]
 
 

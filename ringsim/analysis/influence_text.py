@@ -406,7 +406,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
         why = "no sample is farther from the mean than the numerical error"
         notes.append(f"not told, because {why}: {told}")
     if open_:
-        notes.append(f"not known, as few samples decide it: what matters for {', '.join(open_)}")
+        notes.append(f"too few samples to tell what matters for {', '.join(open_)}")
     if quiet:
         notes.append(f"no significant input for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
@@ -418,8 +418,7 @@ def _undecided(analysis: xr.Dataset, measure: str | None, output: str) -> bool:
     """Whether an interval of its indices is longer than all of its variance."""
     if measure != "total_index" or output not in analysis["output"]:
         return False
-    ends = _index_ends(analysis.sel(output=output), measure)
-    return bool((ends[:, 1] - ends[:, 0] > 1.0).any())
+    return bool(_open(analysis.sel(output=output), measure).any())
 
 
 def _flat(analysis: xr.Dataset) -> list[str]:
@@ -476,9 +475,24 @@ def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[str
         least = _index_ends(one, measure)[:, 0]
         chance = one[_CHANCE[measure]].values if measure in _CHANCE else 0.0 * values
         listed = (values > chance) & (np.where(np.isfinite(least), least, values) > 0.0)
+        if measure == "total_index":
+            listed &= values > _LEAST_INDEX
+            # An interval longer than all of the variance does not say that the index may be none.
+            listed |= _open(one, measure) & (values > _MOST_UNTOLD)
         if np.isfinite(values).any():
             order = np.argsort(-np.nan_to_num(values))
             yield output, names[order[listed[order]]].tolist()
+
+
+_LEAST_INDEX, _MOST_UNTOLD = 0.01, 0.05
+"""Shares of the variance of an output up to which an input is not told, however sure it is, and of
+which few samples decide."""
+
+
+def _open(one: xr.Dataset, measure: str) -> NDArray[np.bool_]:
+    """Which indices of an output have an interval longer than all of its variance."""
+    ends = _index_ends(one, measure)
+    return np.asarray(ends[:, 1] - ends[:, 0] > 1.0)
 
 
 def _index_ends(one: xr.Dataset, measure: str) -> Array:

@@ -19,7 +19,6 @@ Source: Cleary, Garbuno-Inigo, Lan, Schneider and Stuart, J. Comput. Phys. 424 (
 "Calibrate, emulate, sample", here with a linear emulator; for a linear model it is the closed form.
 """
 
-import itertools
 import json
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -30,6 +29,7 @@ import scipy.stats
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.measured import Told
 from ringsim.stepping.instant import Array
 from ringsim.tables import (
     Table,
@@ -93,8 +93,8 @@ class Posterior(NamedTuple):
     off: Array
     """Scatter of runs off the map, the same way, shape (readings,)."""
     leverage: Array
-    """Variance of what is expected by what is not known yet of the unknowns, over that of a reading
-    by its scatter, shape (readings,): how far the posterior follows this one."""
+    """How far the posterior follows each reading, shape (readings,): its misfit has the variance
+    1 - leverage, where runs lie on the map."""
 
     def draw(self, count: int, stream: np.random.Generator, scale: float = 1.0) -> Array:
         """Points of it, wider by ``scale``, shape (count, unknowns)."""
@@ -126,7 +126,7 @@ def posterior_of(points: Array, outputs: Array, data: Array) -> Posterior:
     """
     runs, unknowns = points.shape
     known = np.column_stack([np.ones(runs), points])
-    (start, *slopes), *_ = np.linalg.lstsq(known, outputs, rcond=None)
+    start, *slopes = np.linalg.pinv(known) @ outputs
     left, freedom = outputs - known @ np.vstack([start, *slopes]), runs - unknowns - 1
     # Along what the map tells nothing of there is no need to know how far runs lie off it.
     along, sizes, across = np.linalg.svd(np.array(slopes), full_matrices=False)
@@ -136,42 +136,9 @@ def posterior_of(points: Array, outputs: Array, data: Array) -> Posterior:
     mean = covariance @ (weighed.T @ (across @ (data - start)))
     off = np.sqrt((left**2).sum(axis=0) / freedom)
     each = slopes @ across
-    leverage = np.einsum("ki,kl,li->i", each, covariance, each)
+    leverage = (each * (covariance @ each)).sum(axis=0)
     covariance = 0.5 * (covariance + covariance.T)
     return Posterior(mean, covariance, start + mean @ each, off, leverage)
-
-
-class Told(NamedTuple):
-    """What one sensor has read, and would have read in each run."""
-
-    sensor: str
-    computed: Array
-    """Shape (runs, readings)."""
-    measured: Array
-    """Shape (readings,)."""
-    deviation: float
-    """Standard deviation of one reading."""
-    bias: float = 0.0
-    """That of what all readings of the sensor have in common."""
-    times: Array | None = None
-    """Of the readings, by the clock of the run, s; NaN for what has none."""
-
-    def only(self, kept: Mask) -> "Told":
-        """The readings that are kept, shape (readings,) of true and false."""
-        return self._replace(computed=self.computed[:, kept], measured=self.measured[kept])
-
-    def scaled(self, values: Array) -> Array:
-        """Values of the readings, shape (..., readings), over their scatter.
-
-        With a common bias their covariance is s^2 (1 + r 11'), r = (bias / s)^2; its inverse root
-        is (1 - (1 - 1 / sqrt(1 + n r)) 11' / n) / s.
-        """
-        count = values.shape[-1]
-        share = 1.0 - 1.0 / np.sqrt(1.0 + count * (self.bias / self.deviation) ** 2)
-        return np.asarray(
-            (values - share * values.mean(axis=-1, keepdims=True) if count else values)
-            / self.deviation
-        )
 
 
 class Fit(NamedTuple):
@@ -215,8 +182,8 @@ class Learnt(NamedTuple):
     misfits so alike in all sensors together ("pattern"), and in any sensor ("sensor pattern").  A
     model that is wrong by less than the scatter of a reading shows in its many readings.
     """
-    events: list[tuple[float, int]]
-    """Times (s) at which so many sensors were off together, which is no chance of each."""
+    held: list[str]
+    """What was off where chance does not put strays, and so was kept."""
 
 
 def learn(points: Array, told: Sequence[Told]) -> Learnt:
@@ -224,43 +191,52 @@ def learn(points: Array, told: Sequence[Told]) -> Learnt:
 
     A reading is a stray if it is further off than one in ``1 / _STRAY`` tests has any by chance,
     farthest first, and does not fit what the others tell.  Readings that are off where chance does
-    not put strays (see ``_no_strays``) are what is not explained, and are kept.
+    not put strays (see ``_no_strays``) are kept.
     """
     kept = [np.ones(len(each.measured), dtype=bool) for each in told]
-    whole, back, events = set[int](), set[tuple[int, int]](), list[tuple[float, int]]()
-    while True:
+    back, held = set[_Reading](), list[str]()
+
+    def fit() -> tuple[Posterior, list[Array], list[Array], list[Array]]:
+        """The posterior by what is kept; by sensor misfits, bare and scaled, and ``off``."""
         own = [each.only(mask) for each, mask in zip(told, kept, strict=True)]
+        data = np.concatenate([each.scaled(each.measured) for each in own])
         found = posterior_of(
-            points, np.concatenate([each.scaled(each.computed) for each in own], axis=1),
-            np.concatenate([each.scaled(each.measured) for each in own]),
-        )  # fmt: skip
-        ends = np.cumsum([len(each.measured) for each in own])[:-1]
-        apart = np.split(np.concatenate([e.scaled(e.measured) for e in own]) - found.expected, ends)
-        # What the posterior follows hides its own misfit: of a scatter of 1 it leaves 1 - leverage.
-        left = np.sqrt(np.maximum(1.0 - found.leverage, _LEAST_LEFT) + found.off**2)
-        sizes = [np.abs(a) / s for a, s in zip(apart, np.split(left, ends), strict=True)]
-        aside = [_set_aside(found, points, *each) for each in zip(told, kept, strict=True)]
-        open_ = [k for k, size in enumerate(sizes) if k not in whole and len(size)]
+            points, np.concatenate([each.scaled(each.computed) for each in own], axis=1), data
+        )
+        # What the posterior follows hides its own misfit.
+        left = np.sqrt(np.maximum(1.0 + found.off**2 - found.leverage, _LEAST_LEFT))
+        misfits, ends = data - found.expected, np.cumsum([len(each.measured) for each in own])[:-1]
+        apart, sizes, off = (
+            np.split(v, ends) for v in (misfits, np.abs(misfits) / left, found.off)
+        )
+        return found, apart, sizes, off
+
+    while True:
+        found, apart, sizes, offs = fit()
         least = -float(scipy.special.ndtri(0.5 * _STRAY / len(found.expected)))
         # Others may only look stray beside a farther one.
-        limit = max(least, 0.5 * max((float(sizes[k].max()) for k in open_), default=0.0))
-        worst = [k for k in open_ if (sizes[k] > limit).any()]
+        limit = max(least, 0.5 * max((float(s.max()) for s in sizes if len(s)), default=0.0))
+        worst = [k for k, size in enumerate(sizes) if (size > limit).any()]
         for k in worst:
             kept[k][np.flatnonzero(kept[k])[sizes[k] > limit]] = False
-        # One that fits without the others was only far off beside them; once, or there is no end.
-        fits = [(k, i) for k, each in enumerate(aside) for i, _, size in each if abs(size) < least]
-        fits = [] if worst else [place for place in fits if place not in back]
+        if worst:
+            continue
+        aside = [_set_aside(found, points, *each) for each in zip(told, kept, strict=True)]
+        # One that fits was only far off beside others; put back once, or there is no end.
+        fits = {(k, i) for k, each in enumerate(aside) for i, _, s in each if abs(s) < least} - back
+        if not fits:
+            break
+        back |= fits
         for k, i in fits:
             kept[k][i] = True
-        back |= {*fits}
-        if not worst and not fits:
-            break
-        closed, together = _no_strays(kept, told)
-        events += together
-        for k in closed - whole:
-            kept[k][:] = True
-        whole |= closed
-    rows, offs = [], np.split(found.off, ends)
+    while elsewhere := _no_strays(kept, told):
+        held += [why for why in elsewhere if why not in held]
+        for k, i in {each for readings in elsewhere.values() for each in readings}:
+            kept[k][i] = True
+    if held:  # beside these others may look stray, which are none
+        found, apart, sizes, offs = fit()
+        aside = [_set_aside(found, points, *each) for each in zip(told, kept, strict=True)]
+    rows = list[Fit]()
     for each, strays, misfit, off in zip(told, aside, apart, offs, strict=True):
         count, there = len(misfit), bool(len(misfit))
         chance = float(scipy.special.chdtrc(count, float(misfit @ misfit))) if there else 1.0
@@ -276,7 +252,7 @@ def learn(points: Array, told: Sequence[Told]) -> Learnt:
         "pattern": float(scipy.special.ndtr(-alike.sum() / np.sqrt(len(alike)))),
         "sensor pattern": min(1.0, len(alike) * float(scipy.special.ndtr(-alike.max()))),
     }
-    return Learnt(found, rows, chances, sorted({*events}))
+    return Learnt(found, rows, chances, held)
 
 
 def _set_aside(
@@ -290,56 +266,61 @@ def _set_aside(
         return []
     known = np.column_stack([np.ones(len(points)), points])
     outputs = told.computed / told.deviation
-    map_, *_ = np.linalg.lstsq(known, outputs, rcond=None)
+    map_ = np.linalg.pinv(known) @ outputs
     apart = told.measured / told.deviation - np.append(1.0, found.mean) @ map_
-    weight = kept.sum() * (told.bias / told.deviation) ** 2
+    ratio = (told.bias / told.deviation) ** 2
+    weight = kept.sum() * ratio
     apart = apart - weight / (1.0 + weight) * (apart[kept].mean() if kept.any() else 0.0)
     off = ((outputs - known @ map_) ** 2).sum(axis=0) / (len(points) - known.shape[1])
-    new = np.einsum("ki,kl,li->i", map_[1:], found.covariance, map_[1:])
-    sizes = apart / np.sqrt(1.0 + new + off)
+    new = (map_[1:] * (found.covariance @ map_[1:])).sum(axis=0)
+    sizes = apart / np.sqrt(1.0 + new + off + ratio / (1.0 + weight))
     return [(int(i), float(apart[i]), float(sizes[i])) for i in places]
 
 
-def _no_strays(
-    kept: Sequence[Mask], told: Sequence[Told]
-) -> tuple[set[int], list[tuple[float, int]]]:
-    """Sensors whose strays are none, by where they are, and times at which several are off.
+_Reading = tuple[int, int]
+"""Number of its sensor, and its own."""
+
+
+def _no_strays(kept: Sequence[Mask], told: Sequence[Told]) -> dict[str, list[_Reading]]:
+    """Readings that are off where chance does not put strays, by why not.
 
     Strays are independent.  So no sensor has far more of them than the others, no row of them is
     longer than chance makes it, nor are several sensors off at one time, with the share that is
     found elsewhere; and all are few.
     """
-    every, strays = sum(map(len, kept)), sum(int((~mask).sum()) for mask in kept)
-    if strays > _OF_ALL * every:
-        return {*range(len(kept))}, []
-    closed, events = set[int](), list[tuple[float, int]]()
+    every, counts = sum(map(len, kept)), [int((~mask).sum()) for mask in kept]
+    strays, found = sum(counts), dict[str, list[_Reading]]()
+    off = [(k, i) for k, mask in enumerate(kept) for i in np.flatnonzero(~mask).tolist()]
 
     def share(of_these: int, among: int) -> float:
         """Of strays elsewhere; one more than there is, since none tells of no share."""
         return min((strays - of_these + 1) / (every - among + 1), 1.0)
 
-    for k, mask in enumerate(kept):
-        count, row = int((~mask).sum()), _longest_row(~mask)
+    for k, (mask, count) in enumerate(zip(kept, counts, strict=True)):
         chance = len(kept) * scipy.stats.binom.sf(count - 1, len(mask), share(count, len(mask)))
-        many = count > _OF_SENSOR * len(mask) and chance < _UNLIKELY
-        if many or (row > _IN_A_ROW and every * share(row, row) ** row < UNEXPLAINED):
-            closed.add(k)
-    known = [np.full(len(m), np.nan) if t.times is None else t.times
+        if count > max(1.0, _OF_SENSOR * len(mask)) and chance < _UNLIKELY:
+            why = f"{counted(count, 'reading')} of {told[k].sensor}, far more than of others"
+            found[why] = [each for each in off if each[0] == k]
+            continue
+        for begin, row in _rows(~mask):
+            if row > _IN_A_ROW and every * share(row, row) ** row < UNEXPLAINED:
+                why = f"{row} readings of {told[k].sensor} in a row"
+                found[why] = [(k, i) for i in range(begin, begin + row)]
+    times = [np.full(len(m), np.nan) if t.times is None else t.times
              for m, t in zip(kept, told, strict=True)]  # fmt: skip
-    moments = np.unique(np.concatenate([t[~m] for t, m in zip(known, kept, strict=True)]))
-    instants = max(map(len, kept), default=0)
-    for time in moments[np.isfinite(moments)].tolist():
-        there = [k for k, times in enumerate(known) if (times == time).any()]
-        off = [k for k in there if (~kept[k] & (known[k] == time)).any()]
-        chance = scipy.stats.binom.sf(len(off) - 1, len(there), share(len(off), len(there)))
-        if len(off) > 1 and instants * chance < UNEXPLAINED:
-            closed |= {*off}
-            events.append((time, len(off)))
-    return closed, events
+    for time in sorted({float(times[k][i]) for k, i in off if np.isfinite(times[k][i])}):
+        there = sum(bool((each == time).any()) for each in times)
+        those = [(k, i) for k, i in off if times[k][i] == time]
+        chance = scipy.stats.binom.sf(len(those) - 1, there, share(len(those), there))
+        if len(those) > 1 and max(map(len, kept)) * chance < UNEXPLAINED:
+            found[f"{len(those)} sensors together at {time:.6g} by the clock"] = those
+    return found or ({"more than a tenth of all readings": off} if strays > _OF_ALL * every else {})
 
 
-def _longest_row(strays: Mask) -> int:
-    return max((len(list(row)) for stray, row in itertools.groupby(strays) if stray), default=0)
+def _rows(strays: Mask) -> list[tuple[int, int]]:
+    """Beginning and length of each row of strays."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], strays, [False]])))
+    return [(int(a), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _alike(misfit: Array) -> float:
@@ -506,21 +487,15 @@ def _standing_out(found: xr.Dataset) -> list[str]:
             + f" (false alarms: at most {FALSE_ALARM:g} if all are as the prior says)" * bool(parts)
         )  # fmt: skip
         if parts:
-            suspect = called[int(np.flatnonzero(own["group"] > 0)[0])]
+            at = int(np.flatnonzero(own["group"] > 0)[0])
+            most = 10.0 * float(own["prior_quantile"][at, 1])
+            law = f'{{ kind = "uniform", low = 0.0, high = {most:.2g} }}' if most > 0.0 else "..."
             lines.append(
                 "the prior of the others holds the value of such a place back: give each that is "
-                f"named a wide one of its own beside theirs, '{name}{suspect}' = "
-                f"{_wide(own, suspect)}, and calibrate again"
+                f"named a wide one of its own beside theirs, '{name}{called[at]}' = {law}, and "
+                "calibrate again"
             )
     return lines
-
-
-def _wide(own: xr.Dataset, place: str) -> str:
-    """A prior for a fault: any value up to ten times the median of the others."""
-    at = np.flatnonzero([str(name).endswith(place) for name in own["unknown"].values])
-    middle = float(own["prior_quantile"][int(at[0]), 1])
-    most = f"{10.0 * middle:.2g}"
-    return f'{{ kind = "uniform", low = 0.0, high = {most} }}' if middle > 0.0 else "..."
 
 
 _WRONG = {
@@ -532,7 +507,7 @@ _WRONG = {
 
 def _verdict(found: xr.Dataset) -> list[str]:
     """Whether the model explains the data, and what was left out."""
-    notes = list[str]()
+    notes, held = list[str](), json.loads(str(found.attrs.get("held", "[]")))
     widest = float(found["off"].max())
     if not _is_explained(found):
         beyond = found["chance"].values * found.sizes["sensor"] < UNEXPLAINED
@@ -541,11 +516,7 @@ def _verdict(found: xr.Dataset) -> list[str]:
         why = [f"{names} {many} by more than scatter"] if names else []
         why += [words for test, words in _WRONG.items()
                 if 3.0 * float(found["chance_of_all"].sel(test=test)) < UNEXPLAINED]  # fmt: skip
-        why += [
-            f"{counted(count, 'sensor')} off together at {number_text(time, 6)} "
-            f"{found.attrs.get('clock_unit', 's')}"
-            for time, count in json.loads(found.attrs.get("events", "[]"))
-        ]
+        why += held
         cause = (
             "no values of these unknowns near the posterior give these readings. The model lacks "
             "something, numerical errors (solver.tolerance) count, or sigma is too small"
@@ -561,6 +532,10 @@ def _verdict(found: xr.Dataset) -> list[str]:
         )
     else:
         notes.append("the posterior explains every sensor within the scatter of its readings")
+        if held:
+            notes.append(
+                f"too far off for chance, and kept, since strays lie elsewhere: {'; '.join(held)}"
+            )
     if widest > 1.0:
         notes.append(
             f"runs of the last stage lie {widest:.2g} sigma off a linear map: use more stages, or "
@@ -572,15 +547,14 @@ def _verdict(found: xr.Dataset) -> list[str]:
             f"of their sensor that fit: {_strays(found)}"
         )
     lost, unused = int(found["lost"].sum()), int(found["unused"])
-    if lost:
-        notes.append(f"{counted(lost, 'run')} of {found.attrs['runs']} failed and told nothing")
     silent = ", ".join(found["sensor"].values[found["readings"].values == 0])
-    if silent:
-        notes.append(
-            f"told nothing, since some run has no value at any of their readings: {silent}"
-        )
-    if unused:
-        notes.append(f"{counted(unused, 'reading')} left out, for which some run has no value")
+    none = "some run has no value"
+    more = {
+        f"{counted(lost, 'run')} of {found.attrs['runs']} failed and told nothing": lost,
+        f"told nothing, since {none} at any of their readings: {silent}": silent,
+        f"{counted(unused, 'reading')} left out, for which {none}": unused,
+    }
+    notes += [words for words, there in more.items() if there]
     return notes
 
 

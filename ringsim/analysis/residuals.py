@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.posterior import HARDLY, LISTED, Told, posterior_of
-from ringsim.measured import Measurement, Readings, by_clock, is_instant
+from ringsim.analysis.posterior import HARDLY, LISTED, posterior_of
+from ringsim.measured import Measurement, Readings, Told, by_clock, is_instant
 from ringsim.outputs.family import VARIABLES, axes, holds, supply
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene

@@ -352,7 +352,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
     if (over := Fate.OVERLOADED.words) in analysis["kind"].values and "outcome_open" in analysis:
         count, opened = (int(analysis.sel(kind=over)[f"outcome_{n}"]) for n in ("samples", "open"))
         told = f"of {counted(count, 'sample')} {over}, {opened} opened all the same"
-        notes.append(f"{told}: all V-joints locked")
+        notes += [f"{told}: all V-joints locked"] * bool(opened)
     return Table(("outcome", "samples", "share", "95 % interval", *_parts()), rows, notes)
 
 

@@ -83,14 +83,22 @@ def unusual(
     the share: some place of every sample is far out by chance.  Its mean counts beside, and large
     differences of the two planes' inputs.
 
-    Of a design that changes one input at a time what is other than in its base case.
+    Of a design that changes one input at a time what is other than in its base case; of a list of
+    cases first their labels, and what most of them have otherwise.  A drawn fault is always told.
     """
     if one_at_a_time(campaign):
         return [other_than_base(campaign, place) for place in places]
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
+    listed = placement(campaign).kind == "list"
+    labels, usual = (_labels(campaign), _usual(campaign)) if listed else ([], [])
     for place, sides in zip(places, separating or [{}] * len(places), strict=True):
-        told, named = _chosen(campaign, place), set[str]()
+        told, named = [str(each.values[place]) for each in labels], set[str]()
+        for name, variable, column, most in usual:
+            if column[place] != most:
+                new, common = (_value(each, _units(variable)) for each in (column[place], most))
+                told.append(f"{name} = {new} (most: {common})")
+                named.add(called(variable))
         for name, larger in sides.items():
             if name not in columns.names or len(told) == _MOST:
                 continue
@@ -122,22 +130,25 @@ def unusual(
     return found
 
 
-def _chosen(campaign: xr.Dataset, place: int) -> list[str]:
-    """Of a list of cases, its labels of this one, and what most of the others have otherwise."""
-    if placement(campaign).kind != "list":
-        return []
-    labels = [
-        v for v in campaign.variables.values()
+def _labels(campaign: xr.Dataset) -> list[xr.DataArray]:
+    """Of a list of cases the texts that tell them apart."""
+    return [
+        campaign[name] for name, v in campaign.variables.items()
         if v.attrs.get("role") == "label" and v.dims == ("sample",) and v.dtype.kind in "OU"
     ]  # fmt: skip
-    told = [str(each.values[place]) for each in labels]
+
+
+def _usual(campaign: xr.Dataset) -> list[tuple[str, xr.DataArray, NDArray[Any], Any]]:
+    """Of each input, or place of it, that most cases of a list have alike: its name, what it is of,
+    its values, and that of most.
+    """
+    found = []
     for variable in (campaign[name] for name in inputs(campaign)):
         for of, column in _columns(variable):
-            values = [_value(each, _units(variable)) for each in column.tolist()]
-            most, count = Counter(values).most_common(1)[0]
-            if values[place] != most and 2 * count > len(values):
-                told.append(f"{of}{called(variable)} = {values[place]} (most: {most})")
-    return told
+            most, count = Counter(column.tolist()).most_common(1)[0]
+            if 2 * count > len(column):
+                found.append((f"{of}{called(variable)}", variable, column, most))
+    return found
 
 
 def _columns(variable: xr.DataArray) -> list[tuple[str, NDArray[Any]]]:

@@ -19,7 +19,6 @@ from ringsim.analysis.posterior import (
     MEMBERS_AN_UNKNOWN,
     WIDER,
     Learnt,
-    Told,
     contrasts,
     explained,
     learn,
@@ -30,7 +29,7 @@ from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, listed_cases, require_no_launcher, start
 from ringsim.campaign.specification import Campaign, Stages, campaign_of, refuse_other
 from ringsim.files import parse_toml, read_text, whole, writing
-from ringsim.measured import Measurement, load_measured
+from ringsim.measured import Measurement, Told, load_measured
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
 from ringsim.sampling.columns import Axis, Table, add_inputs, alike, correlate, pairs_of
 from ringsim.sampling.designs.independent import sobol_points
@@ -142,7 +141,7 @@ class Unknowns:
     def of(cls, given: Given) -> "Unknowns":
         """Those that a calibration asks for; InputError if one is no number of a range."""
         asked, file = given.campaign.specification, given.campaign.file.name
-        table, found = given.campaign.draw(), dict[str, Axis]()
+        table, found, numbers = given.campaign.draw(), dict[str, Axis](), dict[str, str]()
         for column in table.columns:
             law = asked.inputs[column.input]
             if not isinstance(law, Ranged | Calibrated):
@@ -151,7 +150,8 @@ class Unknowns:
                     "can be found from data: give it a continuous distribution"
                 )
             bare = law.model_copy(update={"shared": (), "each_section": False})
-            for mark in _marks(column.values, () if law.shared else column.places):
+            for k, mark in enumerate(_marks(column.values, () if law.shared else column.places)):
+                numbers[f"{column.input}[{k + 1}]"] = f"{column.input}{mark}"
                 shared = tuple(f"{path}{mark}" for path in law.shared)
                 # Of a posterior each place is an input of its own: together again here.
                 group = column.input.partition("[")[0]
@@ -171,9 +171,10 @@ class Unknowns:
                 found[own] = Axis(own, law, units, own, own)
         found = alike(found)
         matrix = np.eye(len(found))
-        for pair, one, other in pairs_of(list(found), asked.correlations):
+        pairs = [pair.renamed(numbers) for pair in asked.correlations]
+        for pair, one, other in pairs_of(list(found), pairs):
             matrix[one, other] = matrix[other, one] = pair.coefficient
-        correlate(np.full((1, len(found)), 0.5), list(found), asked.correlations)  # refuses others
+        correlate(np.full((1, len(found)), 0.5), list(found), pairs)  # refuses others
         lower = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
         return cls(table, tuple(found.values()), lower)
 
@@ -283,12 +284,11 @@ class _Course:
 
     def _accepted(self, points: Array, unknowns: Unknowns, scene: Scene) -> Array:
         """Points of a stage whose values the scene takes: where the map of a wide ensemble has
-        overshot, nearer to the middle of the one before, or of the priors.
+        overshot, nearer to the middle of the one before.
         """
         if not self.stages:
             return points
-        before = self.stages[-2].posterior.mean if len(self.stages) > 1 else 0.0
-        step = self.stages[-1].posterior.mean - before
+        step = self.stages[-1].posterior.mean - self.points[-1].mean(axis=0)
         for nearer in (0.0, 0.5, 0.75, 0.875):
             moved = points - nearer * step
             with contextlib.suppress(InputError):
@@ -325,16 +325,17 @@ class _Course:
             if well[0] != 0:
                 raise InputError(f"{name}: the run at the medians of all unknowns failed")
             self.nominal = [values[0] for values in every]
-        self.told, self.unused = [], 0
+        self.told, self.unused, clock = [], 0, self.given.measurement.file.clock
         for k, (readings, values) in enumerate(
             zip(self.given.measurement.readings, every, strict=True)
         ):
             measured = self.nominal[k] if self.planning else readings.values
             there = np.isfinite(values).all(axis=0) & np.isfinite(measured)
             self.unused += int((~there).sum())
+            times = readings.times[there] if clock is None else clock.shown(readings.times[there])
             self.told.append(Told(readings.sensor.name, values[:, there], measured[there],
                                   readings.deviation, readings.bias_deviation,
-                                  readings.times[there]))  # fmt: skip
+                                  times))  # fmt: skip
         if not any(len(each.measured) for each in self.told):
             raise InputError(
                 f"{name}: no reading lies within all runs: check clock.offset of the measured data "
@@ -407,6 +408,8 @@ def _write_posterior(course: _Course) -> None:
         axis.moved(m, s, test)
         for axis, m, s in zip(unknowns.axes, mean.tolist(), deviation.tolist(), strict=True)
     ]
+    strays = [float(told.times[k]) for fit, told in zip(last.fits, course.told, strict=True)
+              if told.times is not None for k in fit.strays]  # fmt: skip
     per_unknown, per_sensor, per_stage = ("unknown",), ("sensor",), ("stage",)
     numbers: dict[str, tuple[tuple[str, ...], Any, str]] = {
         "prior_quantile": (("unknown", "level"),
@@ -430,7 +433,7 @@ def _write_posterior(course: _Course) -> None:
         "readings": (per_sensor, [fit.readings for fit in last.fits], "readings that were used"),
         "strays": (per_sensor, [len(fit.strays) for fit in last.fits],
                    "readings that were set aside"),
-        "stray_time": (("stray",), _stray_times(course), "time of a reading that was set aside, as "
+        "stray_time": (("stray",), strays, "time of a reading that was set aside, as "
                        "its table has it (clock_unit)"),
         "stray_size": (("stray",), [size for fit in last.fits for size in fit.stray_sizes],
                        "that reading less what is expected, over the scatter of a reading"),
@@ -467,7 +470,7 @@ def _write_posterior(course: _Course) -> None:
         "measured": given.measurement.file.name, "inputs": json.dumps(says),
         "clocks": json.dumps(_clocks(given, medians)),
         "clock_unit": clock.unit if clock else "s",
-        "events": json.dumps([[clock.shown(t) if clock else t, n] for t, n in last.events]),
+        "held": json.dumps(last.held),
         "correlations": json.dumps(pairs), **build.provenance(),
     }  # fmt: skip
     path = course.folder / POSTERIOR
@@ -492,21 +495,13 @@ def _write_posterior(course: _Course) -> None:
 
 
 def _clocks(given: Given, medians: Mapping[str, float]) -> dict[str, dict[str, list[float]]]:
-    """By the test's name offset and drift of its clock, in its file and as found; or nothing."""
-    clock = given.measurement.file.clock
+    """By tests' names offset and drift of their clocks, in their files and as found."""
+    clock, earlier = given.measurement.file.clock, dict(given.campaign.clocks)
     if clock is None or not any(name.startswith("clock.") for name in medians):
-        return {}
+        return earlier
     before = {"offset": clock.offset, "drift": clock.drift}
     found = {n: [was, medians.get(f"clock.{n}", was)] for n, was in before.items()}
-    return {given.measurement.file.name: found}
-
-
-def _stray_times(course: _Course) -> list[float]:
-    """When readings were taken that are set aside, as the measured table says it."""
-    of = zip(course.stages[-1].fits, course.told, strict=True)
-    times = [float(told.times[k]) for fit, told in of if told.times is not None for k in fit.strays]
-    clock = course.given.measurement.file.clock
-    return times if clock is None else [clock.shown(time) for time in times]
+    return earlier | {given.measurement.file.name: found}
 
 
 def _write_sensors(course: _Course) -> None:

@@ -457,10 +457,11 @@ _MARKS = {"measured": "calibrate", "variables": "optimise", "design": "campaign"
 def refuse_other(table: Mapping[str, Any], name: str, verb: str) -> None:
     """Refuse (InputError) the content of a file that another verb takes."""
     noun = {"campaign": "campaign", "calibrate": "calibration", "optimise": "optimisation"}[verb]
+    an = "an" if noun[0] in "aeiou" else "a"
     if "structure" in table and not {"scene", *_MARKS} & set(table):
         raise InputError(
-            f"{name}: structure: this is a scene, not a {noun} file: run it with ringsim run, or "
-            f'name it in a {noun} file, as scene = "{name}"'
+            f"{name}: structure: this is a scene, not {an} {noun} file: run it with ringsim run, "
+            f'or name it in {an} {noun} file, as scene = "{name}"'
         )
     if "sensors" in table:
         raise InputError(

@@ -312,7 +312,7 @@ def plot_command(
 def _draw_measured(
     dataset: xr.Dataset, measured: Path, folder: Path, stem: str, formats: Formats
 ) -> None:
-    from ringsim.analysis.residuals import residuals
+    from ringsim.analysis.residuals import clock_line, residuals
     from ringsim.measured import load_measured
     from ringsim.plots import figures, style
     from ringsim.plots.comparison import measured_and_computed
@@ -320,6 +320,8 @@ def _draw_measured(
     measurement = load_measured(measured)
     title = measurement.file.title or measurement.file.name
     figure = measured_and_computed(residuals(dataset, measurement), title)
+    if clock := clock_line(dataset, measurement):
+        click.echo(clock)
     style.in_readable_units(figure)
     for written in figures.write_figure(
         figure, folder, f"{stem}-fig-measured", formats or ("png",)

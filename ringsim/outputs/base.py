@@ -336,7 +336,9 @@ def jerked(run: Run) -> str:
     late = np.argwhere(near).tolist()
     if not late:
         return ""
-    also = "another joint locked in the same step" if driven[near].any() else "steps are too long"
+    also = "another joint locked within two steps before" if jerks[near].any() else (
+        "steps are too long")  # fmt: skip
+    also = "another joint locked in the same step" if driven[near].any() else also
     planes = run.scene.structure.planes
     names = ", ".join(f"{planes[plane]} {section + 1}" for plane, section in late[:_NAMED])
     more = f" and {len(late) - _NAMED} more" if len(late) > _NAMED else ""

@@ -118,7 +118,8 @@ def evidence_of(of: Of, name: str) -> str:
     if cell.get("largest bar", "-") == "-" and (bars := bars_in(campaign, name)).any():
         # A design without means has no table of errors.
         factor, worst = unit_of(of.analysis, name)[0], int(np.argmax(bars))
-        cell = cell | {"largest bar": f"{number_text(factor * bars[worst], 2)} (sample {worst})",
+        where = f"(sample {campaign['sample'].values[worst]})"
+        cell = cell | {"largest bar": f"{number_text(factor * bars[worst], 2)} {where}",
                        "samples with bars": str(np.count_nonzero(bars))}  # fmt: skip
     if OUTCOME in campaign and len(campaign[OUTCOME]) == used + lost + absent:
         valued = good(campaign) & np.isfinite(numbers(campaign, name))

@@ -391,6 +391,8 @@ def _farthest(of: Of, name: str) -> str:
     if not np.isfinite(values[0]) or not np.isfinite(values[1:]).any():
         return ""
     (factor, unit), far = unit_of(of.analysis, name), int(np.nanargmax(np.abs(values - values[0])))
+    if values[far] == values[0]:
+        return f"{name}: {with_unit(number_text(factor * values[0]), unit)}, which no change moves"
     base, most = (with_unit(number_text(factor * values[k]), unit) for k in (0, far))
     change = other_than_base(of.campaign, far)
     return f"{name}: {base} in the base case, farthest {most} with {change}"

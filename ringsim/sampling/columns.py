@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Self
 
@@ -198,6 +198,11 @@ class Correlation(Model):
     all places, of two of them those of the same place."""
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
     """Correlation of the underlying normal variables."""
+
+    def renamed(self, names: Mapping[str, str]) -> Self:
+        """With other names of some inputs."""
+        first, second = (names.get(each, each) for each in self.between)
+        return self.model_copy(update={"between": (first, second)})
 
 
 def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correlation]) -> Array:

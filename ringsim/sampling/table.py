@@ -177,7 +177,7 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
                 'kind = "function" that follows it'
             ) from None
         # A value that nobody has written; a path that is none is at fault with any.
-        at_fault = "is not a known key", "there is no value"
+        at_fault = "is not a known key", "there is no value", "leave out each_section"
         if isinstance(middle, float) and not any(words in str(error) for words in at_fault):
             told = f"inputs: {name}: {show(middle)} is the median of what is drawn for it"
             raise InputError(f"{told}, and {error}") from None

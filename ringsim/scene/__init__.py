@@ -317,10 +317,10 @@ def _nearest_file(path: Path) -> str:
     return str(path.parent / near[0]) if near else ""
 
 
-_VERBS = {"measured": "calibration", "variables": "optimisation", "design": "campaign",
-          "inputs": "campaign"}  # fmt: skip
+_FILES = {"measured": "a calibration", "variables": "an optimisation", "design": "a campaign",
+          "inputs": "a campaign"}  # fmt: skip
 """Keys that scenes have not, and the kind of file that has them."""
-_COMMANDS = {"calibration": "calibrate", "optimisation": "optimise", "campaign": "campaign"}
+_VERBS = {"a calibration": "calibrate", "an optimisation": "optimise", "a campaign": "campaign"}
 
 
 def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
@@ -348,10 +348,10 @@ def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
             f"{path.name}: sensors: this is measured data, not a scene: lay it beside a run by "
             f"ringsim compare RUN {path.name}"
         )
-    if key := next((key for key in _VERBS if key in table), ""):
+    if key := next((key for key in _FILES if key in table), ""):
         raise InputError(
-            f"{path.name}: {key}: this is a {_VERBS[key]} file, not a scene: run it with ringsim "
-            f"{_COMMANDS[_VERBS[key]]} (--dry-run only checks it), or give the scene that it names"
+            f"{path.name}: {key}: this is {_FILES[key]} file, not a scene: run it with ringsim "
+            f"{_VERBS[_FILES[key]]} (--dry-run only checks it), or give the scene that it names"
         )
     if named := extensions.names_in(table):
         table["imports"] = extensions.located(named, path.parent)

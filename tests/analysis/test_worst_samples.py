@@ -201,6 +201,13 @@ def test_of_a_list_of_cases_labels_and_what_most_have_otherwise_are_told() -> No
         one[name] = "sample", np.array(values), {"role": "input", "path": name, "units": "s"}
     told = unusual(one, [0, 1, 2])
     assert told == ["nominal", "late; start = 5 s (most: 0 s)", "stopped"]
+    # What is told so is not told again as unusual, nor as a drawn fault.
+    jam = np.array(["none"] * 19 + ["jam"], dtype=object)
+    one = campaign(np.arange(20.0), design={"kind": "list", "file": "cases.csv"})
+    for name, values in {"faults": jam, "force": np.where(jam == "jam", 3.0, 1.0)}.items():
+        one[name] = "sample", values, {"role": "input", "path": name, "units": "N"}
+    (last,) = unusual(one, [19])
+    assert last == "faults = jam (most: none); force = 3 N (most: 1 N)"
 
 
 def test_a_drawn_fault_comes_before_rarer_numbers() -> None:

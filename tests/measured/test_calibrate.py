@@ -375,6 +375,7 @@ def test_gross_errors_are_named_by_sensor_and_time(test_files, found, tmp_path):
     posterior = ringsim.Calibration.read(tmp_path / "cal.toml").run(workers=0, out=tmp_path / "o")
     assert posterior["stray_sensor"].values.tolist() == ["opening_angle upper 1"] * 2
     np.testing.assert_allclose(posterior["stray_time"], [0.2, 0.8], atol=1e-6)
+    assert posterior.attrs["clock_unit"] == "s"
     np.testing.assert_allclose(posterior["stray_size"], [40.0, -20.0], atol=4.0)
     clean = found[0]
     for name in TRUTH:  # but for two readings of 42 the same

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,13 +13,13 @@ from ringsim.analysis.posterior import (
     UNEXPLAINED,
     WIDER,
     Learnt,
-    Told,
     contrasts,
     explained,
     learn,
     posterior_of,
 )
 from ringsim.analysis.residuals import rank, sensors_table
+from ringsim.measured import Told
 
 pytestmark = pytest.mark.quick
 
@@ -209,8 +211,60 @@ def test_sensors_that_are_off_at_one_time_are_no_strays_and_told():
         ]
         found = staged(lambda u: u @ slope.T, told, UNKNOWNS, 200)
         assert told_wrong(found) == event
-        assert found.events == ([(3.5, 6)] if event else [])
+        assert found.held == (["6 sensors together at 3.5 by the clock"] if event else [])
         assert sum(len(fit.strays) for fit in found.fits) == (0 if event else 6)
+
+
+def test_a_glitch_of_all_sensors_hides_no_stray_and_is_told_once():
+    slope, stream = slopes(readings=160), np.random.default_rng(9)
+    data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(160)
+    data[7::20] += 12.0
+    data[63] += 500.0  # of the fourth sensor
+    told = lambda y: [  # noqa: E731
+        each._replace(times=np.arange(20) * 0.5) for each in sensors(y, data, 8)
+    ]
+    found = staged(lambda u: u @ slope.T, told, UNKNOWNS, 200)
+    assert [fit.strays for fit in found.fits] == [[], [], [], [3], [], [], [], []]
+    assert found.held == ["8 sensors together at 3.5 by the clock"]
+    assert told_wrong(found)
+
+
+@pytest.mark.parametrize("others", [10, 300])
+def test_the_only_reading_of_a_sensor_may_be_a_stray(others):
+    """As a lock time beside encoders."""
+    stream = np.random.default_rng(14)
+    slope = slopes(readings=13 * others + 1)
+    data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(len(slope))
+    data[-1] += 60.0
+
+    def told(y):
+        return [*sensors(y[:, :-1], data[:-1], 13), Told("lock", y[:, -1:], data[-1:], 1.0)]
+
+    found = staged(lambda u: u @ slope.T, told, UNKNOWNS, 200)
+    assert [fit.strays for fit in found.fits] == [[]] * 13 + [[0]]
+
+
+def test_a_dead_sensor_is_named_and_voids_no_stray_of_others():
+    slope, stream = slopes(readings=700), np.random.default_rng(15)
+    data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(700)
+    data[:50] += 200.0
+    data[120] += 300.0  # of the third sensor
+    found = staged(lambda u: u @ slope.T, lambda y: sensors(y, data, 14), UNKNOWNS, 200)
+    assert found.fits[2].strays == [20]
+    assert told_wrong(found)
+    (why,) = found.held
+    assert re.fullmatch(r"\d+ readings of s0, far more than of others", why)
+
+
+def test_a_single_reading_with_a_wide_bias_is_judged_by_it():
+    """15 off where its bias has 10: one and a half times what scatters there."""
+    slope, stream = slopes(), np.random.default_rng(16)
+    data = slope @ stream.standard_normal(UNKNOWNS) + stream.standard_normal(READINGS)
+    points = stream.standard_normal((200, UNKNOWNS))
+    outputs = points @ slope.T
+    alone = Told("one", outputs[:, -1:], data[-1:] + 15.0, 1.0, 10.0)
+    found = learn(points, [*sensors(outputs[:, :-10], data[:-10], 3), alone])
+    assert not found.fits[-1].strays
 
 
 def test_rows_that_chance_makes_in_long_sensors_are_strays():

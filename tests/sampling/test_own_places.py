@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from loops import for_each
 
+from ringsim.campaign.calibration import Unknowns, calibration_of
 from ringsim.campaign.specification import campaign_of
 from ringsim.refusal import InputError
 
 pytestmark = pytest.mark.quick
 
+ROOT = Path(__file__).parents[2]
 UPPER, LOWER = (f"cables.{plane}.friction.coefficient" for plane in ("upper", "lower"))
 EACH = '{ kind = "lognormal", mean = 4e-4, standard_deviation = 8e-5, each_section = true }'
 OWN = '{ kind = "uniform", low = 1e-3, high = 4e-3 }'
@@ -57,6 +61,16 @@ def test_correlations_name_places_by_name_or_number(place: str, called: str) -> 
     (own,) = [each.values for each in columns if each.path == f"{UPPER}{place}"]
     (other,) = [each.values[:, 1] for each in columns if each.path == LOWER]
     assert np.corrcoef(own, other)[0, 1] > 0.7
+
+
+@for_each("called", [("[2]", f"[{CALLED}]"), (f"[{CALLED}]", "[2]")])
+def test_calibrations_take_such_correlations_too(called: tuple[str, str]) -> None:
+    file = ROOT / "campaigns" / "stand" / "pulleys" / "pulleys.toml"
+    pair = {"between": [f"{UPPER}{called[0]}", f"{LOWER}{called[1]}"], "coefficient": 0.5}
+    text = tomli_w.dumps(tomllib.loads(file.read_text()) | {"correlations": [pair]})
+    unknowns = Unknowns.of(calibration_of(text, file))
+    one, other = (unknowns.names.index(f"{name}[{CALLED}]") for name in (UPPER, LOWER))
+    assert (unknowns.lower @ unknowns.lower.T)[one, other] == pytest.approx(0.5)
 
 
 @for_each(

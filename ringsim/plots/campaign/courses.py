@@ -338,6 +338,7 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     legend(figure, [grid[0]])
     locks = locks_of(campaign)
     done = int(np.isfinite(locks).all(axis=(1, 2)).sum())
-    note = f"the last joint is counted in the {done} samples in which all have come to 180 deg"
+    note = "shares are of all of them; the last joint is counted in the "
+    note += f"{done} samples in which all have come to 180 deg"
     head(figure, campaign, "Lock order", f"{told(campaign, len(locks))}; {note}")
     return figure

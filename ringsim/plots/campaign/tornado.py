@@ -194,11 +194,18 @@ def _bars(
     held = np.isfinite(inside)
     # What alone goes with an output may be a place of an input whose mean is held: see influence.
     plain = "rank_correlation" if second == "partial_rank_correlation" else "-"
-    ends = of(f"{measure}_interval", (2,))
-    if measure.endswith("_index"):  # longer than all of the variance: tables say that few decide it
-        ends = np.where(np.diff(ends) > 1.0, np.nan, ends)
+
+    def ends_of(name: str) -> tuple[NDArray[np.floating], NDArray[np.bool_]]:
+        """Intervals; of an index none that is longer than all of the variance, as tables say it."""
+        ends = of(f"{name}_interval", (2,))
+        far = (np.diff(ends)[:, 0] > 1.0) & name.endswith("_index")
+        return np.where(far[:, None], np.nan, ends), far
+
+    ends, far = ends_of(measure)
+    each = zip(names[order].tolist(), far.tolist(), strict=True)
+    called = [name + " (few decide it)" * few for name, few in each]
     return Bars(
-        measure, names[order].tolist(), values[order], ends, inside, of(f"{second}_interval", (2,)),
+        measure, called, values[order], ends, inside, ends_of(second)[0],
         np.where(held, np.nan, of(plain, ())),
         np.where(held[:, None], np.nan, of(f"{plain}_interval", (2,))),
         np.nan if chance is None or not len(order) else float(np.min(chance[order])), told,
