@@ -534,7 +534,8 @@ def _verdict(found: xr.Dataset) -> list[str]:
         notes.append("the posterior explains every sensor within the scatter of its readings")
         if held:
             notes.append(
-                f"too far off for chance, and kept, since strays lie elsewhere: {'; '.join(held)}"
+                "too far off for chance, and kept, since chance does not put strays so: "
+                + "; ".join(held)
             )
     if widest > 1.0:
         notes.append(

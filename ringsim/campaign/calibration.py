@@ -272,7 +272,7 @@ class _Course:
             campaign = listed_cases(
                 self.folder, name, scene, unknowns.cases(points),
                 title=f"{asked.title or asked.name}: {title}", limits=asked.limits,
-                fidelity=asked.fidelity, clocks=_clocks(given, middle),
+                fidelity=asked.fidelity, clocks=_clocks(given, middle if number else {}),
             )  # fmt: skip
         except InputError as error:
             cure = "truncate the prior that gives it"

@@ -210,10 +210,10 @@ def with_own_places(base: Scene, inputs: Mapping[str, Distribution]) -> dict[str
             by_place[name] = {path: inputs.get(path, bare) for path in own}
     for name, law in inputs.items():
         if law.follows in by_place:
-            alone_ = next(path for path in by_place[law.follows] if path in inputs)
+            place_ = next(path for path in by_place[law.follows] if path in inputs)
             raise InputError(
-                f"inputs: {name} follows {law.follows}, of which {alone_} has a distribution of "
-                f"its own: let {name} follow one place, or leave out {alone_}"
+                f"inputs: {name} follows {law.follows}, of which {place_} has a distribution of "
+                f"its own: let {name} follow one place, or leave out {place_}"
             )
     moved = {path for places in by_place.values() for path in places}
     found = dict[str, Distribution]()
