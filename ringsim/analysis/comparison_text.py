@@ -404,7 +404,8 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
     columns = 8 if found.attrs["runs"] else len(head)
     same = "the same in both" if found.attrs["runs"] else "the same in each pair"
     notes = [f"{same}: {', '.join(alike)}"] * bool(alike) + _numerical(found, [r[0] for r in rows])
-    notes += [f"in all samples of both {', '.join(again)}"] * bool(again)
+    both = "in both runs" if found.attrs["runs"] else "in all samples of both"
+    notes += [f"{both} {', '.join(again)}"] * bool(again)
     named = ", ".join(flat.values())
     notes += [f"differences and scatter below {100 * _ALIKE:g} %: {named}"] * bool(flat)
     for name, side in zip(names_of(found), ("first", "second"), strict=True):

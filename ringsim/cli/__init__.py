@@ -169,6 +169,14 @@ def main() -> None:
         error.show()
         code = EXIT_BAD_INPUT
     except click.ClickException as error:
+        if isinstance(error, click.NoSuchOption) and error.possibilities and error.ctx:
+            shown = {
+                name
+                for each in error.ctx.command.params
+                if not getattr(each, "hidden", False)
+                for name in each.opts
+            }
+            error.possibilities = [each for each in error.possibilities if each in shown]
         command = getattr(getattr(error, "ctx", None), "command_path", "ringsim")
         message = error.format_message().replace("integer range", "whole number")
         message = message.replace("integer", "whole number").replace("float range", "number")

@@ -340,6 +340,11 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     yield from text_table(["angle (deg)", "drive", *of_it, *kinds, *own, *margins], rows)
     for name, drive in drives.items():
         yield from _formula(name, drive, kinds)
+        for plane in drive.drive.jammed(drive.standard.friction):
+            yield (
+                f"  cables.{scene.structure.planes[plane]}: with {drive.standard.friction:g} times "
+                "its friction a pulley passes on no tension, and the spans behind it drive nothing"
+            )
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least())}"
@@ -468,10 +473,14 @@ def explain_command(names: tuple[str, ...], schema: str | None, imports: tuple[s
         for root in ("scene", "campaign"):  # refuses records that no file could choose
             schema_of(root)
     known = COORDINATES | {SPAN_NAME.name: SPAN_NAME} | VARIABLES
-    # Paths are looked up before anything is printed, so that one that is refused stands alone.
-    told = [explained(known[name]) if name in known else _key(name, known) for name in names]
-    for text in told or map(explained, known.values()):
-        click.echo(text)
+    refused = []
+    for name in names or known:
+        try:
+            click.echo(explained(known[name]) if name in known else _key(name, known))
+        except InputError as error:  # the others are explained all the same
+            refused.append(str(error))
+    if refused:
+        raise InputError("\n".join(refused))
 
 
 def explained(variable: Variable) -> str:

@@ -192,6 +192,16 @@ class Drive:
         """The cables that there are."""
         return [cable for _, cable in self._cables]
 
+    def jammed(self, friction: float) -> list[int]:
+        """Planes whose pulleys pass on no tension at so many times their friction: its law has no
+        solution any more.
+        """
+        return [
+            number
+            for number, cable in self._cables
+            if cable.friction.factored(friction).refusal(cable.pulley_radius) is not None
+        ]
+
     def reeved(self, now: Configuration) -> list[Reeved]:
         """All cables on a mechanism at its coordinate."""
         found = []

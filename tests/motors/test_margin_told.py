@@ -205,3 +205,17 @@ def test_a_run_draws_what_resists_and_its_least_margin(
     assert np.all(np.diff(angles) >= 0.0)
     words = lower.get_title() or lower.get_title(loc="left")
     assert f"least margin {float(found.least_drive_margin):.3f}" in words
+
+
+def test_pulleys_that_the_standards_factor_jams_are_told(tmp_path: Path) -> None:
+    """A bearing of f/R = 0.4 has 1.2 with a factor of 3: no tension behind its pulleys."""
+    path = "cables.upper.friction.coefficient"
+    told_of = {
+        share: told(tmp_path / "one.toml", load_scene("ring18-motor").with_values({
+            path: 0.01 * share, "margin": {"kind": "ecss-e-st-33-01c"},
+        }))
+        for share in (0.3, 0.4)
+    }  # fmt: skip
+    line = "  cables.upper: with 3 times its friction a pulley passes on no tension"
+    assert [line in text for text in told_of.values()] == [False, True]
+    assert "cables.lower: with" not in told_of[0.4]

@@ -37,3 +37,10 @@ def test_an_unknown_name_is_refused_with_the_nearest() -> None:
     found = CliRunner().invoke(cli, ["explain", "asynchronie"])
     assert found.exit_code == 2
     assert "asynchrony" in found.output
+
+
+def test_names_beside_an_unknown_one_are_explained() -> None:
+    found = CliRunner().invoke(cli, ["explain", "nonsense", "status", "solver.step"])
+    assert found.exit_code == 2
+    assert found.stdout == explain("status") + explain("solver.step")
+    assert found.stderr.startswith("nonsense: neither a key")

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from loops import for_each
 
 from ringsim import load_scene, simulate
-from ringsim.cli import VERBS, cli
+from ringsim.cli import VERBS, cli, main
 from ringsim.dataset import save
 from ringsim.refusal import EXIT_BAD_INPUT, InputError
 
@@ -474,3 +474,20 @@ def test_a_run_tells_them_too(tmp_path: Path) -> None:
     told = ringsim("run", "truss2", "--fidelity", "frame", *settings).splitlines()
     assert told[0] == "doubtful: structure.corner_mass: corners of 180 kg on rods of 0.143 kg"
     assert told[1].startswith("truss2: ok, deployed")
+
+
+def test_options_that_no_help_lists_are_not_suggested(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["ringsim", "campaign", "--worker", "1", "file.toml"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == EXIT_BAD_INPUT
+    told = capsys.readouterr().err
+    assert "Did you mean '--workers'?" in told
+    assert "--solver" not in told
+
+
+def test_a_free_rope_in_millimetres_is_refused() -> None:
+    told = refused("check", "ring18-cable", "--set", "limits.slack_length=50")
+    assert "limits.slack_length = 50 m must be at most 1 m; 50 mm are 0.05 m" in told
