@@ -33,6 +33,7 @@ from ringsim.analysis.intervals import (
     LEAST_OF_BOOTSTRAP,
     NOTHING,
     ONE_DECIDES,
+    ROUND_OFF,
     TWIN,
     all_alike,
     hardly_apart,
@@ -513,7 +514,7 @@ def error_tables(analysis: xr.Dataset, *, every: bool = False) -> list[Table]:
         factor, units = unit_of(analysis, name)
         errors, largest = factor * errors, factor * largest
         cells = [number_text(errors[0], 2)]
-        nothing = max(_NO_ERROR * max(abs(least), abs(most)), NOTHING) * factor
+        nothing = max(ROUND_OFF * max(abs(least), abs(most)), NOTHING) * factor
         for error, count, most_of_all, sample in list(
             zip(errors, counts, largest, samples, strict=True)
         )[1:]:
@@ -558,8 +559,6 @@ OF_ERRORS = (
     "engines, over the samples that have them; they do not average out: the mean is as wrong"
 )
 """What the columns of the error budget are."""
-_NO_ERROR = 1e-7
-"""Error over the value below which it is told as 0: no output is known to so many digits."""
 
 
 def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:

@@ -384,7 +384,8 @@ def status_lines(campaign: Folder) -> list[str]:
             rate = (workers - checking) * ended[0] / max(spent[0], 1e-9)
             busy = f"{counted(checking, 'worker')} busy with checks" if checking else ""
             beside = busy or "without checks" * bool(ended[1])
-            lines.append(f"  rate           {rate:.3g} samples/s" + f" ({beside})" * bool(beside))
+            beside = f" ({beside})" * bool(beside)
+            lines.append(f"  rate           {rate:.3g} samples/s so far{beside}")
         about = time_left(campaign, workers, dict(unfinished))
         lines.append(f"  time left      {about}{' for these' * bool(growth)}")
     if left and (changed := other_build(campaign)):

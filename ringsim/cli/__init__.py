@@ -176,7 +176,8 @@ def main() -> None:
                 if not getattr(each, "hidden", False)
                 for name in each.opts
             }
-            error.possibilities = [each for each in error.possibilities if each in shown]
+            near = [each for each in error.possibilities if each in shown]
+            error = click.NoSuchOption(error.option_name, possibilities=near, ctx=error.ctx)
         command = getattr(getattr(error, "ctx", None), "command_path", "ringsim")
         message = error.format_message().replace("integer range", "whole number")
         message = message.replace("integer", "whole number").replace("float range", "number")

@@ -132,6 +132,9 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
             number = number if factor == 1.0 else factor * number
             bar = factor * np.asarray(values.get(f"{variable.name}_error", np.nan)).item()
             text = f"{number:{variable.summary[1]}}"
+            if not number and variable.largest_of:  # at no place and no time
+                found[variable.name] = f"{'0':>{len(text)}} {unit_text(unit)}".rstrip()
+                continue
             text = without_power(text, number).strip().rjust(len(text))
             text = known_to(text, bar, exact=number).strip().rjust(len(text))
             text = f"{text} {unit_text(unit)}".rstrip()

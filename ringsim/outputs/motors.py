@@ -308,7 +308,13 @@ class DriveMargins(Output):
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
         word = "enough" if margin >= 0.0 else "NOT enough"
         if margin >= 0.0 and values.get("outcome") in (Fate.PARTLY_DEPLOYED, Fate.STALLED):
-            word = "enough if rods were rigid: driven sections would open the others, too"
+            course = np.asarray(values.get("drive_margin", ()))
+            last = course[np.isfinite(course)][-1:]
+            # A ring that nobody drives in the end was left by its winches, not by its own sections.
+            word = (
+                "enough until the winches were switched off" if (last < 0.0).any()
+                else "enough if rods were rigid: driven sections would open the others, too"
+            )  # fmt: skip
         # Before the last winch starts one plane has no drive, as everybody knows who delays it.
         whole = float(values.get("least_plane_margin", math.nan))
         plane = float(values.get("least_plane_margin_started", whole))

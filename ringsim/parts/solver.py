@@ -149,7 +149,7 @@ class Limits(Model):
     """Longest time for which any span may be slack without a break, before its plane has locked: a
     rope that is slack for longer may leave its pulleys, and the outcome is "slackened"."""
     slack_length: Annotated[MetreOrZero, Field(le=1.0)] = 1e-4
-    """Free rope in a span, beyond its length, from which on that counts; at most 1 m.  A span of L metres
+    """Free rope in a span, beyond its length, from which on that counts.  A span of L metres
     with s metres of free rope sags by sqrt(3 L s / 8): 4 mm, the depth of a small pulley's groove,
     for L = 0.4 m and s = 0.1 mm."""
 

@@ -44,14 +44,15 @@ def drive(dataset: xr.Dataset) -> Figure:
     angle, known = angle[grows], known.isel(time=grows)
     figure = Figure(figsize=(8.0, 6.8))
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 3))
-    kinds = [k for k in known["resistance"].values if (known["drive_resistance"].sel(
-        resistance=k) > 0.0).any()]  # fmt: skip
+    every = known["resistance"].values.tolist()
+    kinds = [k for k in every if (known["drive_resistance"].sel(resistance=k) > 0.0).any()]
+    places = [every.index(k) for k in kinds]  # the same colour in all runs of a scene
     heights = [known["drive_resistance"].sel(resistance=k).clip(min=0.0) for k in kinds]
     if kinds:
         upper.stackplot(
             angle, *(each.values for each in heights), labels=kinds,
-            colors=[_SOURCES[k % len(_SOURCES)] for k in range(len(kinds))], alpha=0.7,
-            hatch=[_HATCHES[k % len(_HATCHES)] for k in range(len(kinds))], edgecolor=style.INK,
+            colors=[_SOURCES[k % len(_SOURCES)] for k in places], alpha=0.7,
+            hatch=[_HATCHES[k % len(_HATCHES)] for k in places], edgecolor=style.INK,
             linewidth=0.3,
         )  # fmt: skip
     upper.plot(

@@ -107,6 +107,8 @@ def output_line(of: Of, name: str) -> str:
     if (sample := cell["worst sample"]) != "-":
         worst = with_unit(cell["most" if larger else "least"], unit)
         words.append(f"worst {worst} in sample {sample}")
+    if absent := int(of.analysis[f"{name}_samples"].values[2]):
+        words.append(f"{counted(absent, 'sample')} without a value")
     return f"{told}: {'; '.join(words)}"
 
 

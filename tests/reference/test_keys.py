@@ -140,7 +140,7 @@ def test_a_misspelt_name_is_refused_with_the_nearest(name: str, meant: str) -> N
     found = CliRunner().invoke(cli, ["explain", "asynchrony_max", name])
     assert found.exit_code == 2
     assert meant in found.output
-    assert len(found.output.splitlines()) == 1
+    assert len(found.stderr.splitlines()) == 1
     with pytest.raises(InputError):
         known(name, [])
 

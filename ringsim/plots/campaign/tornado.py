@@ -46,7 +46,7 @@ from ringsim.plots.campaign.frame import (
     still,
 )
 from ringsim.stepping.instant import Array
-from ringsim.tables import counted, unit_behind
+from ringsim.tables import chance_text, counted, unit_behind
 
 MEASURES = {
     "total_index": "Total Sobol' index",
@@ -147,11 +147,11 @@ def bars_of(campaign: xr.Dataset) -> Iterator[tuple[str, Bars]]:
 def _counted(one: xr.Dataset, *, blocks: bool) -> str:
     """Samples or blocks that indices of an output are from, or why it has none."""
     if one["missing_by_inputs"].item() < UNLIKELY:
-        chance = max(one["missing_by_inputs"].item(), 1e-4)
+        chance = chance_text(one["missing_by_inputs"].item())
         why = (
             f"{counted(one['missing'].item(), 'sample')} without a value,\nwhich depends on inputs"
         )
-        return f"no index: {why} (p <= {chance:.1g})"
+        return f"no index: {why} ({chance})"
     if not MEASURES.keys() & set(one):
         return ""
     of = "blocks" if blocks else "samples"
