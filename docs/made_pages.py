@@ -16,6 +16,7 @@ from ringsim.cable.records import path_of, points_along, spans_of
 from ringsim.cli import VERBS, command_of
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
+from ringsim.reference import WORDS
 from ringsim.reference.keys import Key, keys_of, kind_in, words_of
 from ringsim.reference.tree import common, facts, places
 from ringsim.units import Model
@@ -68,6 +69,11 @@ def _table(given: list[Key], path: str) -> str:
         for key in given
     ]
     return _rows(("key", "what it takes", "meaning"), rows)
+
+
+def words() -> str:
+    """What words of tables, verdicts and figures mean."""
+    return _rows(("word", "meaning"), [(f"`{name}`", told) for name, told in WORDS.items()])
 
 
 def variables() -> str:
@@ -186,6 +192,7 @@ def _rows(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 MAKERS: dict[str, Callable[..., str]] = {
     "keys": keys,
     "variables": variables,
+    "words": words,
     "places": places_of_cables,
     "commands": commands,
     "python": python,

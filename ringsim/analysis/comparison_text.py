@@ -301,7 +301,7 @@ def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
     told = "differences within the numerical errors (root sum of squares of the error bars of both)"
     alone = "intervals are of sampling alone; " * (not found.attrs["runs"])
     return [f"{told}: {', '.join(within)}"] * bool(within) + [
-        f"{alone}numerical errors that both share cancel, others add",
+        f"{alone}a numerical error that both runs have alike is not in their difference",
         *_without_bars(found, every),
     ]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ringsim.analysis import derived
 from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.analysis.design import placement_of
-from ringsim.analysis.intervals import samples_needed
+from ringsim.analysis.intervals import quantities, samples_needed
 from ringsim.analysis.requirements import Requirement, doubt_of
 from ringsim.campaign.folder import Folder, digests, opened_as, other_build
 from ringsim.campaign.merging import is_behind
@@ -35,7 +35,7 @@ from ringsim.sampling.distributions import labels_of
 from ringsim.storage.journal import Survey, survey
 from ringsim.storage.netcdf import in_use, runs_in
 from ringsim.storage.result import Result, check_of, sample_of
-from ringsim.tables import counted, size_text
+from ringsim.tables import counted, number_text, size_text, with_unit
 from ringsim.variables import NO_CODE, Status
 
 Samples = NDArray[np.int64]
@@ -204,6 +204,7 @@ def _predicted(
         per_cost = result.seconds / cost[trial]
         size = float(len(result.body) + len(result.header()))
         basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
+        basis += _has_of(result, campaign.specification.requirements)
         if result.status != Status.OK:
             basis += "; runs that end well may take far longer than this one"
     each = per_cost * cost[todo]
@@ -216,6 +217,19 @@ def _predicted(
         ends += f"; with error bars {_span(each[barred])}"
     spread = f" ({ends})" if each.min() < each.max() else ""
     return each, [f"{each.mean():.3g} s each{spread}, {basis}"], size
+
+
+def _has_of(result: Result, requirements: Mapping[str, Requirement]) -> str:
+    """What a run has of the outputs that are required, beside which a limit in another unit shows;
+    nothing of those that it does not compute itself.
+    """
+    values = result.arrays() if result.status == Status.OK else {}
+    known = [name for name in requirements if name in values and name in quantities()]
+    told = [
+        f"{name} {with_unit(number_text(float(values[name])), quantities()[name].units)}"
+        for name in known
+    ]
+    return f"; it has {', '.join(told)}" * bool(told)
 
 
 def _span(seconds: Array) -> str:

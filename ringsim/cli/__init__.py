@@ -24,7 +24,7 @@ VERBS = {
     "run": "Run one scene.",
     "plot": "Draw the figures of a run or a campaign from its file.",
     "export": "Write results as tables, for MATLAB or for ParaView.",
-    "explain": "Explain variables of results and keys of files.",
+    "explain": "Explain variables of results, keys of files and words of tables.",
     "campaign": "Run a campaign, or finish an interrupted one.",
     "status": "Show the progress of a campaign.",
     "merge": "Write the results of a campaign so far to one file.",

@@ -22,6 +22,7 @@ from ringsim.outputs.family import SPAN_NAME
 from ringsim.overrides import flat, place_of
 from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
+from ringsim.reference import WORDS, word
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.rigid.drive import turns_ever
 from ringsim.rigid.margin import (
@@ -309,7 +310,7 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     # At rest nothing is accelerated, and a net may be slack at every angle; springs may be gone.
     kinds = [k for k in first[0].resisting if any(now.resisting[k] for now in first)]
     known_sources = dict.fromkeys(
-        k for now in first for k, force in now.driving.items() if force > 0.0
+        k for now in first for k, force in now.driving.items() if _force(force, now) != "0"
     )
     sources = list(known_sources) if len(known_sources) > 1 else []
     # Of one standard all that its margin is made of has room beside it.
@@ -457,11 +458,11 @@ def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
     help="Know the kinds and outputs of this file or module, too, as under imports of a scene.",
 )
 def explain_command(names: tuple[str, ...], schema: str | None, imports: tuple[str, ...]) -> None:
-    """Explain the variables of a result, or the keys of a file.
+    """Explain the variables of a result, the keys of a file, or the words of tables.
 
     NAME is a variable (asynchrony_max), the path of a key (cables.upper.winch, solver.step,
-    design), or a kind of file for all of its keys: scene, campaign, measured, optimisation or
-    calibration.  Without a name all variables are listed.
+    design), a word of tables ("samples to go"), or a kind of file for all of its keys: scene,
+    campaign, measured, optimisation or calibration.  Without a name all variables are listed.
     """
     extensions.load(extensions.located(imports, Path()))
     if schema is not None:
@@ -493,12 +494,18 @@ def explained(variable: Variable) -> str:
 
 
 def _key(name: str, variables: dict[str, Variable]) -> str:
-    """A key of files in words; InputError if there is none of that name."""
+    """A key of files, or a word of tables; InputError if there is none of that name."""
     # Here, because variables are explained without reading every record of the package.
     from ringsim.reference import tree
 
     parts = [tree.all_of(name)] if name in tree.ROOTS else []
-    found = tree.find(name) if parts else tree.known(name, list(variables))
+    try:
+        found = tree.find(name) if parts else tree.known(name, list(variables))
+    except InputError:
+        if told := word(name):
+            return told
+        raise
+    parts += [word(name)] * (name in WORDS)
     parts += [tree.told(each) for each in found]
     if any(place_of(each.path, closed=True) == "pulley" for each in found):
         parts.append(tree.names_of_pulleys(found[0].path))

@@ -327,7 +327,10 @@ def ending(dataset: xr.Dataset) -> str:
     final = float(dataset.get("final_time", math.nan))
     reason = str(dataset.attrs.get("reason", "")).strip()
     start = "Ended" if word == "none" else word.capitalize()
-    start += f" after {final:.4g} s" if math.isfinite(final) else ""
+    # What rests is known to do so some time later: then the time is that of the run.
+    rests = not status.failed and fate in (Fate.STALLED, Fate.PARTLY_DEPLOYED)
+    when = f" (run until {final:.4g} s)" if rests else f" after {final:.4g} s"
+    start += when if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
 
 

@@ -332,3 +332,15 @@ def test_status_loads_nothing_that_it_does_not_need():
     code = f"import sys, ringsim.cli.campaign; print(*{heavy} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+def test_dry_run_lays_limits_beside_what_its_trial_has(bench):
+    """A limit in another unit, or for another antenna, shows before anything has run."""
+    more = "[requirements]\ndeployment_time = { max = 10.0, probability = 0.9, confidence = 0.5 }"
+    file = bench.write(4, more=more)
+    printed = bench.run("campaign", file, "--dry-run", "--out", "out")
+    (told,) = re.findall(r"it has deployment_time (\S+) s$", printed, re.MULTILINE)
+    trial = int(re.search(r"from a trial run of sample (\d+)", printed)[1])
+    bench.run("campaign", file, "--out", "out")
+    has = float(bench.result("out")["deployment_time"].sel(sample=trial))
+    assert float(told) == pytest.approx(has, rel=1e-3)

@@ -11,12 +11,15 @@ from click.testing import CliRunner
 
 from motor_rings import ring
 from ringsim.cli import cli
+from ringsim.outputs.balance import summary
+from ringsim.outputs.motors import DriveMargins
 from ringsim.parts.margin import EcssMechanisms, NasaMechanisms
 from ringsim.plots import figures
 from ringsim.plots.drives_and_locks import drive
 from ringsim.rigid.margin import DriveMargin
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
+from ringsim.variables import Fate
 
 
 @pytest.fixture(scope="module")
@@ -219,3 +222,32 @@ def test_pulleys_that_the_standards_factor_jams_are_told(tmp_path: Path) -> None
     line = "  cables.upper: with 3 times its friction a pulley passes on no tension"
     assert [line in text for text in told_of.values()] == [False, True]
     assert "cables.lower: with" not in told_of[0.4]
+
+
+@pytest.mark.parametrize(
+    ("last", "told"), [(-1.0, "until the winches were switched off"), (0.7, "if rods were rigid")]
+)
+def test_a_ring_that_stalls_is_not_blamed_on_its_rods_once_nobody_drives(
+    last: float, told: str
+) -> None:
+    values = {
+        "least_drive_margin": np.array(0.7), "least_drive_margin_angle": np.array(20.0),
+        "least_drive_margin_time": np.array(0.0), "outcome": np.array(int(Fate.STALLED)),
+        "drive_margin": np.array([0.7, 0.9, last, np.nan]),
+    }  # fmt: skip
+    assert f"enough {told}" in DriveMargins().told(values, {})
+
+
+def test_the_drives_course_ends_below_zero_where_the_winches_stop() -> None:
+    stop = {f"cables__{plane}__winch__stop_time": 0.3 for plane in ("upper", "lower")}
+    found = simulate(ring(margin={"kind": "ecss-e-st-33-01c"}, solver__end_time=1.0, **stop))
+    course = found["drive_margin"].dropna("time").values
+    assert course[0] > 0.0
+    assert course[-1] == -1.0
+
+
+def test_a_peak_of_nothing_has_no_place() -> None:
+    few = {"structure.sections": 6, "solver.end_time": 5.0}
+    found = simulate(load_scene("ring18-flight").with_values(few), fidelity="frame")
+    assert float(found["peak_net_tension"]) == 0.0
+    assert summary(dict(found.variables), {})["peak_net_tension"].split() == ["0", "N"]

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from ringsim.cli import cli
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
+from ringsim.reference import WORDS
 
 pytestmark = pytest.mark.quick
 
@@ -44,3 +45,15 @@ def test_names_beside_an_unknown_one_are_explained() -> None:
     assert found.exit_code == 2
     assert found.stdout == explain("status") + explain("solver.step")
     assert found.stderr.startswith("nonsense: neither a key")
+
+
+def test_words_of_tables_are_explained() -> None:
+    assert explain("Samples to go").startswith("samples to go: how many more samples")
+    assert explain("posteriors").startswith("posterior: what is known")
+    # A word that is a key, too, is told as both.
+    assert "clock: offset and drift" in explain("clock")
+    assert "clock (measured file)" in explain("clock")
+
+
+def test_no_word_of_tables_hides_a_variable() -> None:
+    assert not WORDS.keys() & VARIABLES.keys()

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from ringsim.analysis.derived import Derived
 from ringsim.plots import style
+from ringsim.variables import Fate
 
 pytestmark = pytest.mark.quick
 
@@ -92,3 +93,8 @@ def test_an_output_by_an_expression_has_its_name_and_the_expression_as_it_is_wri
     drawn = xr.DataArray(0.0, name="apart", attrs={"long_name": made.long_name, "units": "degree"})
     assert style.label(drawn) == "apart = max(abs(asynchrony)) (deg)"
     assert style.label(drawn.assign_attrs(long_name="largest lag")) == "Largest lag (deg)"
+
+
+def test_the_end_of_a_run_at_rest_is_not_when_it_came_to_rest(unfinished):
+    run = unfinished.assign(outcome=int(Fate.STALLED)).assign_attrs(reason="no winch moves it")
+    assert style.ending(run) == "Stalled (run until 12 s): no winch moves it"
