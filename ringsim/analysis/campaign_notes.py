@@ -144,7 +144,8 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
     whole = [sorted((own | first.get(kind, {})).items()) for kind, own in found.items()]
     every = int(held.sum())
     return [
-        f"in {_of(len(own), every)}, for example in sample {own[0][0]}: {own[0][1]}"
+        f"in {_of(len(own), every)}, {'for example in ' * (len(own) > 1)}sample {own[0][0]}: "
+        f"{own[0][1]}"
         for own in sorted(whole, key=len, reverse=True)
     ]
 

@@ -141,7 +141,8 @@ def check_lines(campaign: xr.Dataset) -> list[str]:
         lines += text_table(head, rows)
         lines.append(
             "both error bars there: of the frame and of the full engine together, in the sample of "
-            "the worst difference; share: of the full engine's value"
+            "the worst difference, the largest of all samples where that one has none; share: of "
+            "the full engine's value"
         )
     return [*lines, *_other_ends(campaign), *verdict(campaign, found)]
 

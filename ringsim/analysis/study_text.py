@@ -24,6 +24,7 @@ from ringsim.analysis.design import placement, population_of
 from ringsim.analysis.influence_text import (
     FEW_DECIDE,
     influence_tables,
+    mattering,
     sensitivity_tables,
     what_matters,
     what_separates,
@@ -60,6 +61,7 @@ from ringsim.analysis.verdicts import (
     SHARE_MET,
     Verdict,
     decisive,
+    in_short,
     judge,
     stopping_lines,
     verdict_about,
@@ -192,12 +194,17 @@ def sections(
     ``folder`` is the campaign's, for the commands that run samples again; unless ``full`` what
     tells it at length is left out, which takes most of the time.
     """
-    changing = rarer_table(analysis)
-    short = [what_matters(analysis), *refusals(analysis), what_separates(analysis), changing]
+    changing, separated, errors = (
+        rarer_table(analysis), what_separates(analysis), error_tables(analysis)
+    )  # fmt: skip
+    strongest = {output: found for output, found, _ in mattering(analysis) if found}
+    short = [what_matters(analysis), *refusals(analysis), separated, changing]
     if "case" in analysis.dims:
         short = [case_table(analysis)]
     more = _at_length(analysis) if full else {}
+    brief = in_short(analysis, errors, separated, strongest)
     found = (
+        Section("short", "In short", [Table((), (), brief)]),
         Section("tail", "Rare event", [tail_table(analysis)]),
         Section("outcomes", "Outcomes", [outcome_table(analysis)]),
         Section(
@@ -209,7 +216,7 @@ def sections(
         Section(
             "errors",
             "Numerical and statistical errors",
-            error_tables(analysis),
+            errors,
             more.get("errors", ()),
         ),
         Section("matters", "What matters", short, more.get("matters", ())),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -451,6 +451,59 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         "verdict without failed runs", "samples to go",
     )  # fmt: skip
     return marked(Table(head, rows, notes), analysis, head.index(SHARE_MET))
+
+
+# An analysis in a few sentences, for who reads no table.
+
+
+_MOST_NAMED = 4
+"""Outputs without a requirement of which the sentences speak."""
+
+
+def in_short(
+    analysis: xr.Dataset, errors: Sequence[Table], separated: Table,
+    strongest: Mapping[str, Sequence[str]],
+) -> list[str]:  # fmt: skip
+    """What the antenna did, which requirements are met, what goes with failures (rows of what
+    ``separated`` them) and with outputs (the ``strongest`` inputs of each), and which of the
+    ``errors`` is the largest: sentences with the numbers of these tables.
+    """
+    told = list[str]()
+    if "kind" in analysis.dims:
+        counts = analysis["outcome_samples"].values.tolist()
+        each = [f"{kind} {n}" for kind, n in zip(analysis["kind"].values, counts, strict=True)]
+        run = counted(analysis.attrs["samples_run"], "sample")
+        told.append(f"of {run}: {', '.join(each)}")
+    names = analysis["requirement"].values.tolist() if "requirement" in analysis.dims else []
+    verdicts = {name: verdict_about(analysis, name) for name in names}
+    for verdict in Verdict:
+        own = [one for one in verdicts.values() if one["verdict"] == verdict]
+        parts = []
+        for one in own:
+            bad = f"{one['samples_violating']} of {one['samples_used']} violate it"
+            said = [bad] * bool(one["samples_violating"])
+            said += [IF_HOLD] * bool(one["verdict_may_change"])
+            parts.append(one["requirement_text"] + f" ({', '.join(said)})" * bool(said))
+        if parts:
+            of_all = "judged" if verdict == Verdict.NO_POPULATION else verdict.words
+            told.append(f"requirements {of_all}: {'; '.join(parts)}")
+    told += [
+        f"what separates {group} from the others: {row[1]}, {row[2]}"
+        for row in separated.rows
+        if (group := row[0])  # the best of each group
+    ]
+    chosen = [name for name in names if name in strongest] or list(strongest)[:_MOST_NAMED]
+    told += [f"{name} goes most with {' and '.join(strongest[name][:2])}" for name in chosen]
+    sources: dict[str, list[str]] = {}
+    budget = (row for table in errors if "dominates" in table.head for row in table.rows)
+    for output, *_, source in budget:
+        word = source.partition(" (")[0]
+        if output.partition(" ")[0] in (names or chosen) and word != "-":
+            sources.setdefault(word, []).append(output)
+    errors_of = {"sampling": "of the draw", "numerical": "of steps and elements",
+                 "engines": "between the engines"}  # fmt: skip
+    parts = [f"that {errors_of[word]} in {', '.join(of)}" for word, of in sources.items()]
+    return told + [f"the largest error of a mean is {'; '.join(parts)}"] * bool(parts)
 
 
 SHARE_MET = "share that meets it"

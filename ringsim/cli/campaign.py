@@ -270,7 +270,8 @@ def changed(new: Arrays, old: Arrays) -> list[str]:
         before, after = float(old[name]), float(new[name])
         # Of margins, which may be negative, no share tells anything.
         apart = before > 0.0 and np.isfinite(after) and before != after
-        more = f" ({100.0 * (after / before - 1.0):+.2g} %)" if apart else ""
+        share = 100.0 * (after / before - 1.0) if apart else 0.0
+        more = f" ({share:{'+.0f' if abs(share) >= 100.0 else '+.2g'}} %)" * apart
         bars = [float(each.get(f"{name}_error", np.nan)) for each in (old, new)]
         factor, unit = readable(variable.units, np.nanmax(np.abs([before, after, 0.0])))
         values = " -> ".join(

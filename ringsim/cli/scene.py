@@ -498,6 +498,8 @@ def _key(name: str, variables: dict[str, Variable]) -> str:
     # Here, because variables are explained without reading every record of the package.
     from ringsim.reference import tree
 
+    if name == tree.ANY:  # a word, and in paths any name of the user's
+        return word(name)
     parts = [tree.all_of(name)] if name in tree.ROOTS else []
     try:
         found = tree.find(name) if parts else tree.known(name, list(variables))

@@ -49,12 +49,12 @@ class BaseReaction(Output):
         ),
         Variable(
             "peak_base_force", (), "N", "largest force at the base at any step",
-            error_bar=ErrorBar("largest base force", safety=4.2, of="base_force"),
+            error_bar=ErrorBar("largest base force", safety=3.0, of="base_force"),
             summary=("largest base force", "10.3g"), worse="larger", largest_of="base_force",
         ),
         Variable(
             "peak_base_torque", (), "N m", "largest torque at the base at any step",
-            error_bar=ErrorBar("largest base torque", safety=4.4, of="base_torque"),
+            error_bar=ErrorBar("largest base torque", safety=3.0, of="base_torque"),
             summary=("largest base torque", "10.3g"), worse="larger", largest_of="base_torque",
         ),
         *(variable for peak in peaks for variable in peak.variables),

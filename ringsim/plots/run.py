@@ -52,9 +52,7 @@ class Peak(NamedTuple):
         near = float(np.interp(self.time, time, values.to_numpy()))
         if len(time) < 2 or abs(near - self.value) <= _ON_CURVE * abs(self.value):
             return ""
-        return (
-            f"curves: records every {np.median(np.diff(time)):.3g} s, and the largest of all steps"
-        )
+        return f"curves: records every {np.median(np.diff(time)):.3g} s; dot: of all steps"
 
 
 _ON_CURVE = 0.03

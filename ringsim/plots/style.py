@@ -329,8 +329,7 @@ def ending(dataset: xr.Dataset) -> str:
     start = "Ended" if word == "none" else word.capitalize()
     # What rests is known to do so some time later: then the time is that of the run.
     rests = not status.failed and fate in (Fate.STALLED, Fate.PARTLY_DEPLOYED)
-    when = f" (run until {final:.4g} s)" if rests else f" after {final:.4g} s"
-    start += when if math.isfinite(final) else ""
+    start += f" {'by' if rests else 'after'} {final:.4g} s" if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
 
 

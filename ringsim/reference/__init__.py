@@ -13,12 +13,17 @@ WORDS = {
     "influence; the short tables list what is beyond it",
     "check": "a run of a sample by the other engine, too, beside which it is laid",
     "clock": "offset and drift of a sensor's time against the run's, found with the unknowns",
+    "drive margin": "what drives over all that resists, each with its standard's factor, less 1, "
+    "at the angle where it is least; the variable is least_drive_margin",
     "effect": "mu*, the mean absolute change of an output by a move of a group (Morris), in the "
     "output's unit",
+    "effective samples": "how many plain samples of the other distribution the weighted ones are "
+    "worth",
     "error bar": "how far the steps and elements of a run may put a number off, by a second run "
     "with half the steps and twice the elements",
     "first-order index": "share of an output's variance that an input, or a group, explains by "
     "itself",
+    "given-data index": "first-order index from bins of plain samples, corrected for chance",
     "held": "a reading that does not fit and is kept, because it and the others like it are too "
     "many, or too much together, for chance",
     "interval": "where a statistic of all antennas lies with 95 % confidence, by the samples that "
@@ -26,6 +31,8 @@ WORDS = {
     "lag": "how far the opening angle of a joint is from the mean of all at that time; of a motor "
     "how long it is slower than commanded",
     "learnt": "the posterior's standard deviation over the prior's: 1 where the data tell nothing",
+    "may be off": "samples in which the number is uncertain: steps at a lock were too long (?), or "
+    "the limit is closer than the numerical error",
     "not explained": "the unknowns do not fit the data within their errors: the model, or an error "
     "that was given, is wrong",
     "not yet shown": "neither met nor broken by the samples so far: more of them are needed",
@@ -40,6 +47,7 @@ WORDS = {
     "samples to go": "how many more samples, none of them violating, would show the requirement",
     "separation": "of all pairs of a sample in the group and one outside, the share in which the "
     "one in the group has the larger (or smaller) input; 50 % tells nothing",
+    "share that meets it": "samples that keep to the requirement over all that ran",
     "slack": "a rope that is longer than its way and carries nothing but the little tension of "
     "slack_width",
     "standard error": "how far a mean is off by the draw of the samples, as a standard deviation",

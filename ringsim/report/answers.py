@@ -2,7 +2,6 @@
 table of the analysis.
 """
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ from ringsim.analysis.intervals import good, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.study_text import outcome_table, unit_of
 from ringsim.analysis.verdicts import BOUND, SHARE_MET, verdict_table
+from ringsim.refusal import show
 from ringsim.report.page import drawn_inputs
 from ringsim.tables import Table, counted, number_text, with_unit
 from ringsim.variables import GOALS, Fate
@@ -82,14 +82,31 @@ def outputs(**cures: str) -> Ask:
                 judged.evidence += own.evidence
                 evidence.setdefault(evidence_of(of, name), []).append(name)
             elif cure:
-                key = re.match(r"([\w.]+) = true", cure)
-                there = key is not None and of.scene.get(key[1]) is True
-                found.lacks[name] = "no sample has a value" if there else cure
+                found.lacks[name] = _still_lacking(of.scene, cure)
         for told, names in evidence.items():
             found.evidence.append(f"{', '.join(names)}: " * (len(evidence) > 1) + told)
         return found + judged
 
     return answer
+
+
+def _still_lacking(scene: Mapping[str, Any], cure: str) -> str:
+    """A cure, "[table], key = value, words", without what the scene has of it already.
+
+    >>> _still_lacking({"boom.base": "free"}, 'boom.base = "free", record.reactions = true')
+    'record.reactions = true'
+    """
+    parts, there = cure.split(", "), set[str]()
+    for part in parts:
+        key, _, value = part.partition(" = ")
+        if part.startswith("[") and any(path.startswith(f"{part[1:-1]}.") for path in scene):
+            there.add(part)
+        if value and key in scene and show(scene[key]) == value:
+            there.add(part)
+    keyed = {part for part in parts if part.startswith("[") or " = " in part}
+    if keyed and keyed <= there:
+        return "no sample has a value"
+    return ", ".join(part for part in parts if part not in there)
 
 
 def output_line(of: Of, name: str) -> str:

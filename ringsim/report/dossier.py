@@ -32,6 +32,7 @@ from ringsim.analysis.worst import (
 )
 from ringsim.files import write_text
 from ringsim.measured import Measurement
+from ringsim.outputs.balance import rules
 from ringsim.outputs.family import Array
 from ringsim.overrides import flat
 from ringsim.refusal import InputError, show
@@ -463,6 +464,7 @@ def _pedigree(of: Of) -> Answer:
 
 
 _UNMEASURED = "no error bars (error_bars_every), numerical errors not known"
+_NO_BARS = "no error bar is made of these, numerical errors not known"
 
 
 @item(NASA, "factor 4, results uncertainty (second-hand)", "How uncertain the results are.")
@@ -480,14 +482,16 @@ def _uncertainty(of: Of) -> Answer:
         source = cell.get("dominates", "-").partition(" ")[0].strip("-")
         if source and not is_moment(name):
             bare = cell["numerical (error bars)"] == "-"
-            largest.setdefault(_UNMEASURED if bare else source, []).append(name)
+            kind = _UNMEASURED if name in rules() else _NO_BARS
+            largest.setdefault(kind if bare else source, []).append(name)
     if not largest and not any(bars_in(of.campaign, n).any() for n in quantities()):
         found.lacks["numerical errors"] = "error_bars_every"
     for source, names in largest.items():
-        many = source in (SOURCES[0], _UNMEASURED)
+        bare = source in (_UNMEASURED, _NO_BARS)
+        many = bare or source == SOURCES[0]
         told = counted(len(names), "output") if many else ", ".join(names)
         part = f"largest part of the error of the mean is {source}"
-        found.evidence.append(f"{source if source == _UNMEASURED else part}: {told}")
+        found.evidence.append(f"{source if bare else part}: {told}")
     return found
 
 

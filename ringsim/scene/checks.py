@@ -213,7 +213,10 @@ def doubtful(scene: "Scene") -> Iterator[str]:
     shortest = min(rod.length for rod in layout.rods)
     for plane, cable in () if scene.cables is None else scene.cables.present():
         path = f"cables.{scene.structure.planes[plane]}"
-        radii = {f"{path}.pulley_radius": cable.pulley_radius}
+        sizes = {
+            f"{path}.pulley_radius": cable.pulley_radius,
+            f"{path}.block_offset": cable.block_offset,
+        }
         winches = {"winch": cable.winch, "far_winch": cable.far_winch}
         for name, winch in ((n, w) for n, w in winches.items() if w is not None):
             if (motor := winch.winding.motor) is not None:
@@ -241,16 +244,16 @@ def doubtful(scene: "Scene") -> Iterator[str]:
                         f"{path}.{name}.winding.current_limit = {limit:g} A is above {most:.3g} A, "
                         "what the motor takes when it stalls: it never acts"
                     )
-                radii[f"{path}.{name}.winding.drum_radius"] = motor.drum_radius
+                sizes[f"{path}.{name}.winding.drum_radius"] = motor.drum_radius
             for key in ("start_time", "stop_time"):
                 if (time := getattr(winch, key)) is not None and time > end:
                     yield (
                         f"{path}.{name}.{key} = {time:g} s is after solver.end_time = {end:g} s: "
                         "it never happens"
                     )
-        for where, radius in radii.items():
-            if radius > shortest:
-                yield f"{where} = {radius:g} m is larger than the shortest rod, {shortest:.4g} m"
+        for where, size in sizes.items():
+            if size > shortest:
+                yield f"{where} = {size:g} m is larger than the shortest rod, {shortest:.4g} m"
     for number, fault in enumerate(scene.faults, 1):
         if fault.time > end:
             yield (

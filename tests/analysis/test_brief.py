@@ -13,7 +13,13 @@ from made import drawn_campaign
 from ringsim.analysis.influence import apart
 from ringsim.analysis.influence_text import what_matters, what_separates
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import OF_ERRORS, error_tables, statistics_table, told
+from ringsim.analysis.study_text import (
+    OF_ERRORS,
+    error_tables,
+    sections,
+    statistics_table,
+    told,
+)
 from ringsim.sampling.designs.blocks import Saltelli
 from ringsim.sampling.designs.independent import RandomDesign, Sobol
 
@@ -323,3 +329,36 @@ def test_differences_of_rounding_are_told_as_zero_and_narrow_ranges_with_all_the
     wanted = {"peak_motor_power": {"max": 3.1, "probability": 0.5, "confidence": 0.9}}
     rows = statistics_table(analyse(made, wanted)).rows
     assert "peak_motor_power" in [row[0] for row in rows]
+
+
+def test_the_sentences_on_top_say_what_the_tables_say():
+    """Of a made campaign whose truth is known: x1 decides, and 40 % violate a limit."""
+    made = drawn_campaign(RandomDesign(samples=400), linear, 3, 4)
+    limit = float(np.sort(made["asynchrony_max"].values)[239])
+    wanted = {
+        "asynchrony_max": {"max": limit, "probability": 0.9, "confidence": 0.9},
+        "peak_tension": {"max": 1e9, "probability": 0.9, "confidence": 0.9},
+    }
+    made["peak_tension"] = "sample", np.linspace(1.0, 2.0, 400), {"units": "N"}
+    lines = sections(analyse(made, wanted), full=False)["short"].tables[0].notes
+    said = "\n".join(lines)
+    assert "of 400 samples: deployed 400" in lines
+    assert re.search(
+        r"^requirements not met: asynchrony_max <= .* deg \(160 of 400 violate it\)$", said, re.M
+    )
+    assert re.search(r"^requirements met: peak_tension <= 1e\+09 N$", said, re.M)
+    separated = re.search(
+        r"^what separates violates .* \(160\) from the others: x1, larger", said, re.M
+    )
+    assert separated
+    assert "asynchrony_max goes most with x1 and x2" in lines
+    # Nothing matters for a row of numbers: no sentence on it.
+    assert "peak_tension goes" not in said
+
+
+def test_the_sentences_name_the_larger_error():
+    made = drawn_campaign(RandomDesign(samples=400), linear, 3, 4)
+    for bar, source in ((0.3, "of steps and elements"), (1e-6, "of the draw")):
+        made["asynchrony_max_error"] = "sample", np.full(400, bar), {"units": "degree"}
+        lines = sections(analyse(made), full=False)["short"].tables[0].notes
+        assert f"the largest error of a mean is that {source} in asynchrony_max" in lines

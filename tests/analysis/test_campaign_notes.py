@@ -91,8 +91,7 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     again = "reached (start 2 with solver.step = 0.1 s; start 1: too much energy (10 %): reduce it)"
     once_more = made.assign(reason=("sample", np.array([again] + [reached] * 11, dtype=object)))
     assert remark_lines(once_more) == [
-        "in 1 of 11 samples, for example in sample 0: first attempt, not used: too much energy "
-        "(10 %): reduce it"
+        "in 1 of 11 samples, sample 0: first attempt, not used: too much energy (10 %): reduce it"
     ]
     made["reason"] = "sample", np.array([f"{reached}; {latch}"] * 12, dtype=object)
     assert remark_lines(made) == [f"in all 11 samples, for example in sample 0: {latch}"]

@@ -68,7 +68,7 @@ def test_a_peak_between_records_is_in_no_curve_of_those_compared(truss):
     words = [text.get_text() for axes in rows for text in axes.texts]
     (told,) = (text for text in words if text.startswith("largest"))
     assert told.startswith("largest of all steps: ")
-    assert told.endswith("curves: records every 0.25 s, and the largest of all steps")
+    assert told.endswith("curves: records every 0.25 s; dot: of all steps")
     peak = peak_of(truss, "cable_tension", "peak_tension")
     assert not peak.apart(xr.full_like(truss["time"], peak.value))
 

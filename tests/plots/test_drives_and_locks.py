@@ -157,7 +157,7 @@ def test_the_base_turns_and_moves_as_the_run_recorded() -> None:
         ((_, figure),) = figures_of(seen, "base")
         (words,) = (t.get_text() for t in figure.axes[3].texts if "largest" in t.get_text())
         apart = float(run["time"][1] - run["time"][0])
-        every = f"curves: records every {apart:.3g} s, and the largest of all steps"
+        every = f"curves: records every {apart:.3g} s; dot: of all steps"
         assert (every in words) == missed
         assert words.startswith("largest of all steps: " if missed else "largest: ")
     # The title tells no more than there is.

@@ -97,4 +97,4 @@ def test_an_output_by_an_expression_has_its_name_and_the_expression_as_it_is_wri
 
 def test_the_end_of_a_run_at_rest_is_not_when_it_came_to_rest(unfinished):
     run = unfinished.assign(outcome=int(Fate.STALLED)).assign_attrs(reason="no winch moves it")
-    assert style.ending(run) == "Stalled (run until 12 s): no winch moves it"
+    assert style.ending(run) == "Stalled by 12 s: no winch moves it"

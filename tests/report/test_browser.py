@@ -174,8 +174,8 @@ def test_the_page_is_printed_with_what_it_folds(
     assert done.exit_code == 0, done.output
     printed = out.with_suffix(".pdf").read_bytes()
     assert printed.startswith(b"%PDF")
-    # Folded, the page has two sheets: the answer and the failures.  None is begun for a figure.
-    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 3
+    # The answer; failures and inputs; the values; where they are from.  None is begun for a figure.
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 4
     assert sorted(each.name for each in tmp_path.iterdir()) == [
         "campaign.nc", "made.html", "made.pdf",
     ]  # fmt: skip

@@ -57,6 +57,8 @@ def output(file: File, said: re.Match[str]) -> None:
     assert abs(float(said["mean"]) - values.mean()) <= 0.051 * (high - low)
     smaller = name.startswith("least")
     assert said["level"] == ("5" if smaller else "95")
+    every = np.where(file.ok, file.values[name], 0.0)
+    assert int(said["absent"] or 0) == int(np.isnan(every).sum())
     agrees(said["far"], np.quantile(values, 0.05 if smaller else 0.95))
     agrees(said["worst"], values.min() if smaller else values.max())
     assert int(said["sample"]) == file.worst(name)[0]
@@ -185,7 +187,7 @@ N, U = r"[-+\d.e]+", r"(?: [a-zA-Z][\w ]*?)?"
 KNOWN = {
     rf"(?P<name>\w+)(?: \*)?: mean (?P<mean>{N})(?P<unit>{U}) \(interval (?P<ends>.+?)\); "
     rf"(?P<level>5|95) % quantile (?P<far>{N})(?P<unit2>{U}); worst (?P<worst>{N})(?P<unit3>{U})"
-    r" in sample (?P<sample>\d+)": output,
+    r" in sample (?P<sample>\d+)(?:; (?P<absent>\d+) samples? without a value)?": output,
     r"(?P<name>[a-z :]+): (?P<count>\d+) of (?P<of>\d+)(?: \((?P<gone>\d+) failed\))?, share \S+ "
     r"\(interval (?P<ends>.+)\)": ending,
     r"(?P<text>.+) in at least (?P<share>\S+) of all \(confidence (?P<level>\S+)\): "

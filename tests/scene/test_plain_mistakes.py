@@ -428,6 +428,7 @@ def test_a_refusal_of_a_part_tells_value_and_cure(values: dict[str, object], tex
 
 
 DOUBTFUL = [
+    ("cables.upper.block_offset=105", "block_offset = 105 m is larger than the shortest rod"),
     ("cables.upper.pulley_radius=0.3", "pulley_radius = 0.3 m is larger than the shortest rod"),
     ("cables.lower.winch.winding.drum_radius=2.0", "winding.drum_radius = 2 m is larger than"),
     ("cables.upper.winch.start_time=500.0", "start_time = 500 s is after solver.end_time"),

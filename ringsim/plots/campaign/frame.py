@@ -208,18 +208,25 @@ def shown(campaign: xr.Dataset, most: int = MOST_PANELS, what: str = "") -> tupl
     ``what`` is what the figure draws of each, where that is not all.
 
     All count if none differs.  Those with limits, of the campaign or of the scene, go first; if
-    there are more, then those that differ most for their size.
+    there are more, then what every campaign is asked for, and those that differ most for their
+    size.
     """
     limited, names = required_by(campaign.attrs) | allowables(campaign), drawable(campaign)
     flat, told = still(campaign, names)
     names = [name for name in names if name not in flat]
     names.sort(key=lambda name: name not in limited)
     if len(names) > most:
-        order = sorted(names, key=lambda name: (name not in limited, -_spread(campaign, name)))
+        order = sorted(names, key=lambda name: (
+            name not in limited, name not in _ASKED, -_spread(campaign, name)
+        ))  # fmt: skip
         others = [name for name in names if name in order[most:]]
         told += f" Not drawn for want of room: {what}{', '.join(others)}."
         names = [name for name in names if name not in others]
     return names, told
+
+
+_ASKED = ("deployment_time", "asynchrony_max", "peak_tension")
+"""How long, how far out of step, how hard."""
 
 
 def _spread(campaign: xr.Dataset, name: str) -> float:
