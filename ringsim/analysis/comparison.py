@@ -532,6 +532,7 @@ def _output(
             (together,) = correlations(centred_ranks(used[0][:, None]), used[1]).tolist()
         if certain:
             ends = placed[0].interval(apart, index[0][pairs.first][known], np.mean)
+            ends = intervals.by_signs(ends, apart)
     else:
         there = [np.isfinite(each) for each in values]
         used = [each[k] for each, k in zip(values, there, strict=True)]

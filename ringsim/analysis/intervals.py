@@ -372,6 +372,14 @@ def of_difference(
 # Arithmetic of shares: intervals of one, exact, and of differences; samples that are needed.
 
 
+def by_signs(ends: tuple[Any, Any], apart: Array) -> tuple[Any, Any]:
+    """The interval of a mean of pairs' differences, with zero in it where so few pairs differ that
+    chance may have given all of them one sign (2 / 2^k, two-sided): 3 of 60 tell no direction.
+    """
+    few = 2.0 ** (1 - np.count_nonzero(apart)) > 1.0 - LEVEL and not np.all(apart)
+    return (min(ends[0], 0.0), max(ends[1], 0.0)) if few and np.isfinite(ends).all() else ends
+
+
 def share_interval(count: int, samples: int) -> Interval:
     """Two-sided exact interval of a share."""
     return share_bounds(count, samples, 0.5 + LEVEL / 2)

@@ -70,6 +70,9 @@ def drive(dataset: xr.Dataset) -> Figure:
     if np.isfinite(margin).any():
         lower.plot(where, least, "o", color=style.VERMILION, markersize=6, zorder=4)
         told = [f"least margin {least:.3f} at {where:.0f} deg"]
+        # By as much as the summary of a run tells it.
+        if (plane := float(dataset.get("least_plane_margin", np.nan))) < least - 5e-3:
+            told[0] += f", of one plane's own cable {plane:.3f}"
     if (known["time"] >= stopped).any():
         told.append(f"no margin from {stopped:.4g} s on: all winches have stopped")
     words = "; ".join(told)  # inside it would lie on the curve

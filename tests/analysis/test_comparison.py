@@ -477,3 +477,14 @@ def test_a_run_and_a_campaign_are_not_compared(tmp_path):
         CliRunner().invoke(
             compare_command, [str(tmp_path), str(tmp_path / "run.nc")], catch_exceptions=False
         )
+
+
+@pytest.mark.parametrize("moved", [1, 3, 5, 6, 12])
+def test_few_pairs_that_differ_tell_no_direction(moved):
+    """As of the shares of outcomes that moved so: five of one sign are chance in 1 of 16."""
+    counts = np.full(60, 24.0)
+    fewer = counts - 12.0 * (np.arange(60) < moved)
+    low, middle, high = difference(compare(seeded(counts), seeded(fewer)))
+    assert middle == pytest.approx(-12.0 * moved / 60)
+    assert (high >= 0.0) == (moved < 6)
+    assert low < middle
