@@ -1,12 +1,13 @@
 """Are the error bars of a run honest?  Random scenes against runs that are finer by far.
 
 Run: python benchmarks/error_bars.py [--first SEED] [--scenes N] [--processes N] [--file F] [--fit]
-         [--fidelity full]
+         [--fidelity full] [--motors]
 
 Each scene is drawn from a seed of its own: closed rings and open arcs, one in eight of 8 to 18
 sections, driven by forces or by cables with a winch at one end or at both, free or clamped, soft
 and stiff, slow and fast, with and without friction, damping and latches, at tolerances from 3e-4
-to 3e-3.  One in three is ended before it has deployed.  The frame engine runs them, or the full
+to 3e-3; with ``--motors`` rings of 4 to 8 sections with an edge net, that motors open.  One in
+three is ended before it has deployed.  The frame engine runs them, or the full
 one: both have the same integrator and bars.  The truth of a scene is a run with steps shorter by 6
 to 16, four or six times the elements and a hundredth of Newton's tolerance: the finest that is not
 too dear for its scene.  Printed per output: how often the bar covers the error, and the ratios of
@@ -116,6 +117,40 @@ def random_scene(seed: int) -> Scene:
     return base.with_values(values)
 
 
+def motor_scene(seed: int) -> Scene:
+    """A ring with a net that motors open, which nobody has tuned."""
+    rng = np.random.default_rng([2030, seed])
+    speed = log_uniform(rng, 100.0, 500.0)
+    values: dict[str, Any] = {
+        "structure.sections": int(rng.integers(4, 9)),
+        "structure.opening_angle": float(rng.uniform(15.0, 60.0)),
+        "structure.corner_mass": log_uniform(rng, 0.01, 0.1),
+        "joints.vjoint.coulomb": log_uniform(rng, 1e-3, 2e-2),
+        "joints.vjoint.viscous": log_uniform(rng, 0.02, 0.8),
+        "stop.latch": bool(rng.random() < 0.7),
+        "net.axial_stiffness": log_uniform(rng, 100.0, 5000.0),
+        "net.strain": float(rng.uniform(0.001, 0.01)),
+        "margin": "none",
+        "record.interval": 0.05,
+        "solver.end_time": 100.0,
+        "solver.tolerance": log_uniform(rng, 3e-4, 3e-3),
+    }
+    inertia = log_uniform(rng, 1e-8, 1e-6) if rng.random() < 0.5 else 0.0
+    ramp = float(rng.uniform(0.3, 3.0)) if rng.random() < 0.5 else 0.0
+    for plane in ("upper", "lower"):
+        winding = f"cables.{plane}.winch.winding"
+        values |= {
+            f"{winding}.stall_torque": log_uniform(rng, 2e-3, 2e-2),
+            f"{winding}.speed": speed,
+            f"cables.{plane}.friction.coefficient": float(rng.uniform(0.0, 8e-4)),
+        }
+        values |= {f"{winding}.rotor_inertia": inertia} if inertia else {}
+        values |= {f"{winding}.ramp": ramp} if ramp else {}
+    if not values["stop.latch"]:
+        values["latch"] = "none"
+    return load_scene("ring18-motor").with_values(values)
+
+
 def truth_of(scene: Scene, found: Outcome) -> Scene:
     """The finest run of a scene that is not too dear, judged by what a plain one took."""
     residuals = int(found.values["steps"] + found.values["newton_iterations"])
@@ -135,9 +170,10 @@ def truth_of(scene: Scene, found: Outcome) -> Scene:
     )
 
 
-def compare(seed: int, fidelity: str) -> dict[str, Any]:
+def compare(seed: int, fidelity: str, motors: bool) -> dict[str, Any]:
     """Value, error and difference of the two runs, for every output of one scene."""
-    begin, scene, run = time.process_time(), random_scene(seed), FIDELITIES[fidelity]
+    begin, run = time.process_time(), FIDELITIES[fidelity]
+    scene = motor_scene(seed) if motors else random_scene(seed)
     one = run(scene)
     rng = np.random.default_rng([2029, seed])
     deployed, part = one.values.get("deployment_time", np.nan), rng.uniform(0.3, 0.95)
@@ -259,14 +295,16 @@ def main() -> None:
     parser.add_argument("--file", type=Path)
     parser.add_argument("--fit", action="store_true")
     parser.add_argument("--fidelity", choices=["frame", "full"], default="frame")
+    parser.add_argument("--motors", action="store_true")
     asked = parser.parse_args()
-    file = asked.file or Path(f"runs/error-bars-{asked.first}.json")
+    file = asked.file or Path(f"runs/error-bars{'-motors' * asked.motors}-{asked.first}.json")
     wanted = range(asked.first, asked.first + asked.scenes)
     rows = json.loads(file.read_text()) if file.exists() else []
     missing = [seed for seed in wanted if seed not in {row["seed"] for row in rows}]
     file.parent.mkdir(parents=True, exist_ok=True)
+    of_one = partial(compare, fidelity=asked.fidelity, motors=asked.motors)
     with multiprocessing.Pool(asked.processes, os.nice, (5,), maxtasksperchild=10) as pool:
-        for row in pool.imap_unordered(partial(compare, fidelity=asked.fidelity), missing):
+        for row in pool.imap_unordered(of_one, missing):
             rows.append(row)
             file.write_text(json.dumps(rows))
             print(row["seed"], row["status"], f"{row['seconds']:.0f} s", flush=True)

@@ -185,7 +185,20 @@ def _run(
         except InputError as error:  # the run itself is as good as without
             outcome.values["first_frequency"] = np.array(np.nan)
             outcome = replace(outcome, reason=f"{outcome.reason}; first_frequency unknown: {error}")
-    return _with_remark(with_margin(outcome, scene, before), scene)
+    return _with_remark(with_margin(_after_faults(outcome, scene), scene, before), scene)
+
+
+def _after_faults(outcome: Outcome, scene: Scene) -> Outcome:
+    """The outcome; of a ring that came to rest short of its goal its reason names the faults that
+    had struck by then.
+    """
+    if outcome.status.failed or outcome.fate not in (Fate.STALLED, Fate.PARTLY_DEPLOYED):
+        return outcome
+    end = float(outcome.values["final_time"])
+    struck = [f"{kind_of(one)} at {one.time:.4g} s" for one in scene.faults if one.time <= end]
+    why, mark, rest = outcome.reason.partition("; ")
+    after = f", after {' and '.join(struck)}" * bool(struck)
+    return replace(outcome, reason=f"{why}{after}{mark}{rest}")
 
 
 def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:

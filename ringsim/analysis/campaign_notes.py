@@ -308,14 +308,14 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 # Series tell which places are alike.
                 values = {str(n): each.values for n, each in worst.variables.items()}
                 number, *told = summary(values, spans)[variable.name].split()
-                error = ""
+                error, raw = "", float(values[variable.name])
+                raw *= readable(variable.units, raw)[0]
                 if variable.error_bar and "+-" not in told:
                     bar, error = _of_others(sound, variable)
                     unknown |= not error
                     if not error:  # more digits would say that they are known
-                        raw = float(values[variable.name])
-                        number = number_text(readable(variable.units, raw)[0] * raw, 4)
-                    number = known_to(number, readable(variable.units, bar)[0] * bar)
+                        number = number_text(raw, 4)
+                    number = known_to(number, readable(variable.units, bar)[0] * bar, exact=raw)
                 said = " ".join([number, *told])
                 error += _checked(worst, variable)
                 name = variable.summary[0] + DOUBT * (f'"{variable.name}"' in says.get(OFF, ""))

@@ -375,8 +375,10 @@ def of_difference(
 def by_signs(ends: tuple[Any, Any], apart: Array) -> tuple[Any, Any]:
     """The interval of a mean of pairs' differences, with zero in it where so few pairs differ that
     chance may have given all of them one sign (2 / 2^k, two-sided): 3 of 60 tell no direction.
+    Pairs differ by more than a hundredth of the largest difference: the others are beside them.
     """
-    few = 2.0 ** (1 - np.count_nonzero(apart)) > 1.0 - LEVEL and not np.all(apart)
+    count = np.count_nonzero(np.abs(apart) > 0.01 * np.abs(apart).max(initial=0.0))
+    few = count < len(apart) and 2.0 ** (1 - count) > 1.0 - LEVEL
     return (min(ends[0], 0.0), max(ends[1], 0.0)) if few and np.isfinite(ends).all() else ends
 
 

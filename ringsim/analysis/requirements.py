@@ -35,6 +35,8 @@ from ringsim.variables import Fate
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ringsim.analysis.design import Placement
+
 OUTCOME = "outcome"
 _WORDS = [fate.word for fate in Fate if fate != Fate.NONE]
 
@@ -434,3 +436,36 @@ def rule_of(attributes: Mapping[Any, Any]) -> Rule | None:
     """The rule that a design or a merged campaign keeps as ``stop_when``; None without one."""
     stored = json.loads(str(attributes.get("stop_when", "null")))
     return None if stored is None else Rule.model_validate(stored)
+
+
+# What became of the rule by which a campaign may end early.
+
+
+def half_width(condition: Condition, campaign: xr.Dataset, placed: Placement) -> float:
+    """Half the length of the interval of a mean or a quantile; NaN if there is none."""
+    values = numbers(campaign, str(condition.of))
+    known = good(campaign) & np.isfinite(values)
+    of = np.mean if condition.quantile is None else condition.quantile
+    low, high = placed.interval(values[known], campaign["sample"].to_numpy()[known], of)
+    return (high - low) / 2
+
+
+def stopping_lines(campaign: xr.Dataset, placed: Placement) -> list[str]:
+    """What became of the rule of a merged campaign, a line; none if it has none."""
+    says = campaign.attrs
+    if (rule := rule_of(says)) is None:
+        return []
+    count, most = campaign.sizes["sample"], int(says.get("planned_samples", 0))
+    if "stopped_after" in says:
+        taken = [*rule.numbers(count, placed.replicates), count]
+        first = f"stop_when ended the campaign after {count} of at most {most} samples, because "
+        first += str(says["stop_reason"])
+    else:
+        taken = rule.numbers(count, placed.replicates)
+        first = f"stop_when did not end the campaign of {count} samples"
+    looks = f"{counted(len(taken), 'look')}: {', '.join(map(str, taken))}" if taken else "no look"
+    kept = []
+    if any(each.requirement for each in rule.conditions):
+        kept.append("the bounds of its requirements allow for these repeated checks")
+    kept.append("the other intervals do not")
+    return [f"{first} ({looks}); {', '.join(kept)}"]

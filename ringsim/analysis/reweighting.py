@@ -530,11 +530,10 @@ def _verdicts(
         if rule is not None:  # it ended the campaign by its results
             levels = rule.levels(name, wanted, int(run.sum()), placed.replicates)
         if has_share_intervals(placed):
-            most, least = (
-                Cap(pairs, int(run.sum()), 1.0 - level).bounds(own[run], weights[run], replicate)
-                for level, own in zip(levels, (broken | ~held, broken), strict=True)
-            )
-            ends = 1.0 - most[1], 1.0 - least[0]
+            for end, level, own in zip((0, 1), levels, (broken | ~held, broken), strict=True):
+                cap = Cap(pairs, int(run.sum()), 1.0 - level)
+                found = _rarer(cap, ~own[run], own[run], weights[run], replicate)
+                ends = (found[0], ends[1]) if end == 0 else (ends[0], found[1])
         verdict = verdict_of(*ends, wanted.probability)
         rows.append((verdict, mean((~broken[held]).astype(float), weights[held]), *ends))
     told = np.array(rows)

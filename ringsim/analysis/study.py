@@ -57,11 +57,12 @@ from ringsim.analysis.requirements import (
     badness_of,
     read_requirements,
     required_by,
+    stopping_lines,
 )
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import rarer, sensitivity
 from ringsim.analysis.tails import tail
-from ringsim.analysis.verdicts import judge, stopping_lines
+from ringsim.analysis.verdicts import judge
 from ringsim.analysis.worst import (
     margins,
     one_at_a_time,

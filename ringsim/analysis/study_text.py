@@ -44,7 +44,7 @@ from ringsim.analysis.intervals import (
     quantities,
     ranks,
 )
-from ringsim.analysis.requirements import required_by
+from ringsim.analysis.requirements import required_by, stopping_lines
 from ringsim.analysis.reweighting import (
     LEAST_OF_MEAN,
     LEAST_OF_SHARE,
@@ -59,11 +59,11 @@ from ringsim.analysis.verdicts import (
     BOUND,
     IF_HOLD,
     SHARE_MET,
+    Parts,
     Verdict,
     decisive,
     in_short,
     judge,
-    stopping_lines,
     verdict_about,
     verdict_table,
     verdict_text,
@@ -197,20 +197,26 @@ def sections(
     changing, separated, errors = (
         rarer_table(analysis), what_separates(analysis), error_tables(analysis)
     )  # fmt: skip
-    strongest = {output: found for output, found, _ in mattering(analysis) if found}
+    strongest = {
+        output: [f"{name}{MARK * bool(analysis.attrs[NOTE])}" for name in found]
+        for output, found, _ in mattering(analysis)
+    }
     short = [what_matters(analysis), *refusals(analysis), separated, changing]
     if "case" in analysis.dims:
         short = [case_table(analysis)]
     more = _at_length(analysis) if full else {}
-    brief = in_short(analysis, errors, separated, strongest)
+    numbers, event, limits = (
+        statistics_table(analysis), tail_table(analysis), margin_table(analysis)
+    )  # fmt: skip
+    brief = in_short(analysis, Parts(event, limits, numbers, separated, errors, strongest))
     found = (
         Section("short", "In short", [Table((), (), brief)]),
-        Section("tail", "Rare event", [tail_table(analysis)]),
+        Section("tail", "Rare event", [event]),
         Section("outcomes", "Outcomes", [outcome_table(analysis)]),
         Section(
             "statistics",
             "Numbers",
-            [statistics_table(analysis)],
+            [numbers],
             more.get("statistics", ()),
         ),
         Section(
@@ -221,7 +227,7 @@ def sections(
         ),
         Section("matters", "What matters", short, more.get("matters", ())),
         Section("worst", "The worst samples", worst_tables(analysis, folder)),
-        Section("requirements", "Requirements", [margin_table(analysis), verdict_table(analysis)]),
+        Section("requirements", "Requirements", [limits, verdict_table(analysis)]),
         Section("reweighting", "Other distributions", reweighting_tables(analysis)),
     )
     says = analysis.attrs

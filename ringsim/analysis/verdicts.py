@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -32,11 +33,11 @@ from ringsim.analysis.intervals import (
 from ringsim.analysis.requirements import (
     KINDS,
     OUTCOME,
-    Condition,
     Levels,
     Requirement,
     Rule,
     doubt_of,
+    half_width,
     require_values,
     rule_of,
     violations,
@@ -460,50 +461,94 @@ _MOST_NAMED = 4
 """Outputs without a requirement of which the sentences speak."""
 
 
-def in_short(
-    analysis: xr.Dataset, errors: Sequence[Table], separated: Table,
-    strongest: Mapping[str, Sequence[str]],
-) -> list[str]:  # fmt: skip
-    """What the antenna did, which requirements are met, what goes with failures (rows of what
-    ``separated`` them) and with outputs (the ``strongest`` inputs of each), and which of the
-    ``errors`` is the largest: sentences with the numbers of these tables.
+class Parts(NamedTuple):
+    """Tables of which sentences take their numbers, and the inputs that go with each output."""
+
+    event: Table
+    limits: Table
+    numbers: Table
+    separated: Table
+    errors: Sequence[Table]
+    strongest: Mapping[str, Sequence[str]]
+
+
+def in_short(analysis: xr.Dataset, parts: Parts) -> list[str]:
+    """What the antenna did, which requirements and limits hold, the numbers that are asked for with
+    what goes with them, what separates failures, and which error is the largest.
     """
-    told = list[str]()
-    if "kind" in analysis.dims:
-        counts = analysis["outcome_samples"].values.tolist()
-        each = [f"{kind} {n}" for kind, n in zip(analysis["kind"].values, counts, strict=True)]
-        run = counted(analysis.attrs["samples_run"], "sample")
-        told.append(f"of {run}: {', '.join(each)}")
+    run, samples = analysis.attrs["samples_run"], analysis.attrs["samples"]
+    if not run:
+        return ["no sample has run yet"]
+    left = [f"{samples - run} of {counted(samples, 'sample')} have not run yet"] * (run < samples)
+    if event := parts.event.rows:  # its chains of samples stand for no share of all antennas
+        first = "; ".join(f"{what} {found}" for what, found in event[:2])
+        return [f"{parts.event.head[1]}: {first}", *parts.event.notes, *left]
+    told = [*_did(analysis, run), *left]
     names = analysis["requirement"].values.tolist() if "requirement" in analysis.dims else []
-    verdicts = {name: verdict_about(analysis, name) for name in names}
-    for verdict in Verdict:
-        own = [one for one in verdicts.values() if one["verdict"] == verdict]
-        parts = []
-        for one in own:
-            bad = f"{one['samples_violating']} of {one['samples_used']} violate it"
-            said = [bad] * bool(one["samples_violating"])
-            said += [IF_HOLD] * bool(one["verdict_may_change"])
-            parts.append(one["requirement_text"] + f" ({', '.join(said)})" * bool(said))
-        if parts:
-            of_all = "judged" if verdict == Verdict.NO_POPULATION else verdict.words
-            told.append(f"requirements {of_all}: {'; '.join(parts)}")
+    told += _held([verdict_about(analysis, name) for name in names])
     told += [
-        f"what separates {group} from the others: {row[1]}, {row[2]}"
-        for row in separated.rows
-        if (group := row[0])  # the best of each group
+        f"{limit}: NOT enough in {beyond} samples, worst {worst} in sample {sample}"
+        for limit, of, worst, margin, sample, beyond in parts.limits.rows
+        if margin.endswith("NOT enough") and of not in names
     ]
-    chosen = [name for name in names if name in strongest] or list(strongest)[:_MOST_NAMED]
-    told += [f"{name} goes most with {' and '.join(strongest[name][:2])}" for name in chosen]
+    rows, head = parts.numbers.rows, parts.numbers.head
+    cells = {row[0].partition(" ")[0]: dict(zip(head, row, strict=True)) for row in rows}
+    chosen = [name for name in names if name in cells or name in parts.strongest]
+    chosen = chosen or [name for name in parts.strongest if name in quantities()][:_MOST_NAMED]
+    told += filter(None, (_number(name, cells.get(name, {}), parts) for name in chosen))
+    told += [
+        f"{re.sub('^violates', 'samples that violate', group)} differ by {row[1]}: {row[2]}"
+        for row in parts.separated.rows
+        if (group := row[0])  # with the best of each
+    ]
     sources: dict[str, list[str]] = {}
-    budget = (row for table in errors if "dominates" in table.head for row in table.rows)
-    for output, *_, source in budget:
-        word = source.partition(" (")[0]
-        if output.partition(" ")[0] in (names or chosen) and word != "-":
-            sources.setdefault(word, []).append(output)
-    errors_of = {"sampling": "of the draw", "numerical": "of steps and elements",
-                 "engines": "between the engines"}  # fmt: skip
-    parts = [f"that {errors_of[word]} in {', '.join(of)}" for word, of in sources.items()]
-    return told + [f"the largest error of a mean is {'; '.join(parts)}"] * bool(parts)
+    for table in parts.errors:
+        for output, *_, source in table.rows if "dominates" in table.head else ():
+            if output.partition(" ")[0] in chosen and source != "-":
+                sources.setdefault(source, []).append(output)
+    each = [f"{source} in {', '.join(outputs)}" for source, outputs in sources.items()]
+    return told + [f"largest error of a mean: {'; '.join(each)}"] * bool(each)
+
+
+def _did(analysis: xr.Dataset, run: int) -> list[str]:
+    """How many ended how; of designs that repeat values only the samples that count."""
+    if "kind" not in analysis.dims:
+        return []
+    counts, of = analysis["outcome_samples"].values.tolist(), int(analysis["outcome_of"].max())
+    each = (f"{kind} {n}" for kind, n in zip(analysis["kind"].values, counts, strict=True))
+    more = f" that count, of {run} that ran" * (of < run)
+    return [f"of {counted(of, 'sample')}{more}: {', '.join(each)}"]
+
+
+def _held(each: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Verdicts by their words, with the counts behind them."""
+    told: dict[str, list[str]] = {}
+    for one in each:
+        verdict, bad, used = Verdict(one["verdict"]), one["samples_violating"], one["samples_used"]
+        chosen = verdict == Verdict.NO_POPULATION
+        words = "of samples that stand for no population" if chosen else verdict.words
+        words += f", {IF_HOLD}" * bool(one["verdict_may_change"] and not chosen)
+        short = one.get("samples_short", 0)
+        said = [f"{bad} of {used} violate it"] * bool(bad or (chosen and used))
+        said += [counted(one["samples_lost"], "failed run")] * bool(one["samples_lost"])
+        said += [f"{short} of {used} meet it only as far as they came"] * bool(short)
+        share = "" if chosen else f" in {one['probability_required']:g} of all"
+        known = f" ({', '.join(said)})" * bool(said)
+        told.setdefault(words, []).append(f"{one['requirement_text']}{share}{known}")
+    return [f"requirements {words}: {'; '.join(texts)}" for words, texts in told.items()]
+
+
+def _number(name: str, cell: Mapping[str, str], parts: Parts) -> str:
+    """Mean and worst value of an output, and the inputs that go with it; empty without either."""
+    said = []
+    if (sample := cell.get("worst sample", "-")) != "-":
+        ends = {"mean": "mean", "worst": "most" if quantities()[name].badness > 0 else "least"}
+        each = {word: with_unit(cell[head], cell["unit"]) for word, head in ends.items()}
+        mean = f"mean {each['mean']}, " * (cell["mean"] != "-")
+        said.append(f"{mean}worst {each['worst']} in sample {sample}")
+    if found := parts.strongest.get(name, ())[:2]:
+        said.append(f"goes most with {' and '.join(found)}")
+    return f"{cell.get('output', name)}: {'; '.join(said)}" * bool(said)
 
 
 SHARE_MET = "share that meets it"
@@ -512,8 +557,6 @@ _DECIDES = (
     "the one-sided bound, at the confidence required, decides each verdict; where neither the "
     "lower nor the upper bound decides, both are given"
 )
-
-
 _CHOSEN = "these samples stand for no population: there is no probability to estimate"
 
 
@@ -548,40 +591,10 @@ def holds(
             what = wanted[each.requirement].told(each.requirement)
             told.append(f"{what} is {verdict_text(one)}")
         else:
-            half = _half_width(each, campaign, placed)
+            half = half_width(each, campaign, placed)
             shown = half <= float(each.half_width or 0.0)
             known = with_unit(number_text(half, 3), quantities()[str(each.of)].units)
             told.append(f"the {each.what} is known to {known}")
         if not shown:
             return ""
     return ", ".join(told)
-
-
-def _half_width(condition: Condition, campaign: xr.Dataset, placed: Placement) -> float:
-    """Half the length of the interval of a mean or a quantile; NaN if there is none."""
-    values = numbers(campaign, str(condition.of))
-    known = good(campaign) & np.isfinite(values)
-    of = np.mean if condition.quantile is None else condition.quantile
-    low, high = placed.interval(values[known], campaign["sample"].to_numpy()[known], of)
-    return (high - low) / 2
-
-
-def stopping_lines(campaign: xr.Dataset, placed: Placement) -> list[str]:
-    """What became of the rule of a merged campaign, a line; none if it has none."""
-    says = campaign.attrs
-    if (rule := rule_of(says)) is None:
-        return []
-    count, most = campaign.sizes["sample"], int(says.get("planned_samples", 0))
-    if "stopped_after" in says:
-        taken = [*rule.numbers(count, placed.replicates), count]
-        first = f"stop_when ended the campaign after {count} of at most {most} samples, because "
-        first += str(says["stop_reason"])
-    else:
-        taken = rule.numbers(count, placed.replicates)
-        first = f"stop_when did not end the campaign of {count} samples"
-    looks = f"{counted(len(taken), 'look')}: {', '.join(map(str, taken))}" if taken else "no look"
-    kept = []
-    if any(each.requirement for each in rule.conditions):
-        kept.append("the bounds of its requirements allow for these repeated checks")
-    kept.append("the other intervals do not")
-    return [f"{first} ({looks}); {', '.join(kept)}"]

@@ -349,6 +349,24 @@ class MotorWinding(FeedbackWinding):
             load = np.where(follows, load + self.rotor_inertia * np.asarray(rate), np.inf)
         return np.clip(most, 0.0, load)
 
+    def largest_power(self, low: Any, high: Any) -> Any:
+        """Largest power of a shaft that runs up from a speed to another (rad/s) with all the torque
+        that it has, W: its speed is a parabola below half of that without a load, or where the
+        limit ends.
+        """
+        half = 0.5 * self.free_speed
+        knee = self.free_speed - self.no_load_speed * self.limit / self.stall_torque
+        speeds = [low, high, *(np.clip(one, low, high) for one in (half, max(knee, 0.0)))]
+        return np.max([one * self.available(one) for one in speeds], axis=0)
+
+    def runs_up(self, speed: Any, time: Any) -> Any:
+        """Whether a rotor at a speed (m/s) is below its command, so long after its winch has
+        started (s), so that it takes all the torque that there is if it can move.
+        """
+        command = self.commanded(time)[0] * np.ones_like(np.asarray(speed, dtype=float))
+        below = np.asarray(speed) / self.travel < command * (1.0 - _FOLLOWS)
+        return below & (self.rotor_inertia is not None)
+
     def speed_at(self, tension: float) -> float:
         """Speed of the drum's rope at a tension (N), in m/s; see the class."""
         holding, winding = self.loads(tension)

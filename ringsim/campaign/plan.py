@@ -453,6 +453,9 @@ def time_left(campaign: Folder, workers: int, running: Mapping[int, float] | Non
     until = shared[np.append(shared[:-1] > free[1:], False).argmin()] if len(waiting) else 0.0
     until = max(until, free[0] + waiting.max(initial=0.0), rest[runs & known].max(initial=0.0))
     told = f"about {in_words(float(until))}"
+    done = np.isfinite(found.seconds)
+    if len(found.missing) and done.any() and cost[found.missing].mean() < 0.8 * cost[done].mean():
+        told += " (costly samples come first)"  # as those with error bars: the rate so far is less
     if guessed and (is_check & known).any():
         told += f", a check taken as {_FULL:g} times a sample"
     for kind, word in ((~is_check, "sample"), (is_check, "check")):

@@ -172,7 +172,7 @@ def main() -> None:
         if isinstance(error, click.NoSuchOption) and error.possibilities and error.ctx:
             shown = {
                 name
-                for each in error.ctx.command.params
+                for each in error.ctx.command.get_params(error.ctx)
                 if not getattr(each, "hidden", False)
                 for name in each.opts
             }

@@ -4,7 +4,7 @@ import json
 import math
 import textwrap
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from ringsim.overrides import flat, place_of
 from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.reference import WORDS, word
-from ringsim.refusal import InputError, known_or_nearest, show
+from ringsim.refusal import EXIT_BAD_INPUT, InputError, known_or_nearest, show
 from ringsim.rigid.drive import turns_ever
 from ringsim.rigid.margin import (
     GEARS,
@@ -151,10 +151,19 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
 
 def _lacking(scene: Scene) -> str:
     """What a scene that asks for a drive margin falls short of, in words; empty if of nothing."""
-    if scene.margin is None:
+    if (standard := scene.margin) is None:
         return ""
-    least = DriveMargin(substituted(scene), scene.margin).least()
-    return f", but {_verdict(least)} (--margin tells why)" if least.margin < 0.0 else ""
+    scene = substituted(scene)
+    both = DriveMargin(scene, standard)
+    told, least = "", both.least()
+    if least.margin < 0.0:
+        told = _verdict(least)
+    else:
+        planes = [(PlaneMargin(both, k).least(), plane) for k, plane in _driven_apart(scene, both)]
+        worst, plane = min(planes, key=lambda each: each[0].margin, default=(least, ""))
+        if worst.margin < 0.0:
+            told = f"the {plane} plane's own cable has {_verdict(worst)}"
+    return f", but {told} (--margin tells why)" * bool(told)
 
 
 def _summary(scene: Scene) -> dict[str, str]:
@@ -341,15 +350,27 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     yield from text_table(["angle (deg)", "drive", *of_it, *kinds, *own, *margins], rows)
     for name, drive in drives.items():
         yield from _formula(name, drive, kinds)
-        for plane in drive.drive.jammed(drive.standard.friction):
-            yield (
-                f"  cables.{scene.structure.planes[plane]}: with {drive.standard.friction:g} times "
-                "its friction a pulley passes on no tension, and the spans behind it drive nothing"
-            )
+        yield from _jammed(scene, drive, [now.angle for now in courses[name]])
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least())}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
+
+
+def _jammed(scene: Scene, drive: DriveMargin, angles: Sequence[float]) -> Iterator[str]:
+    """At which of some angles (rad) pulleys pass on no tension with the standard's friction."""
+    found: dict[int, list[tuple[float, int]]] = {}
+    for angle in angles:
+        over = drive.drive.reeved(drive.mechanism.at(0.5 * (math.pi - angle)))
+        for plane, count in drive.drive.jammed(over, drive.standard.friction).items():
+            found.setdefault(plane, []).append((math.degrees(angle), count))
+    for plane, each in found.items():
+        yield (
+            f"  cables.{scene.structure.planes[plane]}: with {drive.standard.friction:g} times its "
+            f"friction up to {counted(max(count for _, count in each), 'pulley')} pass on no "
+            f"tension, at {', '.join(f'{angle:.0f}' for angle, _ in each)} deg: what lies behind "
+            "them drives nothing"
+        )
 
 
 def _formula(name: str, drive: DriveMargin, kinds: list[str]) -> Iterator[str]:
@@ -398,20 +419,41 @@ def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
             yield f"{place}: stops at {winch.stop_time:g} s; a run includes it until then"
 
 
+def _driven_apart(scene: Scene, both: DriveMargin) -> Iterator[tuple[int, str]]:
+    """Planes with cables that are not alike and turn from the beginning, by number and name."""
+    cables = scene.cables
+    if cables is None or None in (cables.upper, cables.lower) or _equal(scene):
+        return
+    for number, plane in enumerate(scene.structure.planes):
+        if not _late(both, number):
+            yield number, plane
+
+
+def _equal(scene: Scene) -> bool:
+    """Whether both cables are, and are struck by nothing at once."""
+    assert scene.cables is not None
+    struck = any(isinstance(one, CableFault) and one.time <= AT_ONCE for one in scene.faults)
+    return scene.cables.upper == scene.cables.lower and not struck
+
+
+def _late(both: DriveMargin, number: int) -> bool:
+    """Whether all winches of a plane start later."""
+    winches = both.conditions.winches.items()
+    own = [w for (cable, _), w in winches if cable == number and turns_ever(w)]
+    return bool(own) and all(winch.start_time > both.conditions.begin for winch in own)
+
+
 def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
     """The margin of each plane, if both have cables and these are not alike."""
     cables = scene.cables
     if cables is None or None in (cables.upper, cables.lower):
         return
-    struck = any(isinstance(one, CableFault) and one.time <= AT_ONCE for one in scene.faults)
-    if cables.upper == cables.lower and not struck:
+    if _equal(scene):
         yield "both planes are equal: each gives half of the drive"
         return
     both = DriveMargin(scene, standard)
-    winches = both.conditions.winches
     for number, plane in enumerate(scene.structure.planes):
-        own = [w for (cable, _), w in winches.items() if cable == number and turns_ever(w)]
-        if own and all(winch.start_time > both.conditions.begin for winch in own):
+        if _late(both, number):
             yield f"{plane} plane alone: its winch starts later, not included here"
             continue
         least = PlaneMargin(both, number).least()
@@ -474,14 +516,15 @@ def explain_command(names: tuple[str, ...], schema: str | None, imports: tuple[s
         for root in ("scene", "campaign"):  # refuses records that no file could choose
             schema_of(root)
     known = COORDINATES | {SPAN_NAME.name: SPAN_NAME} | VARIABLES
-    refused = []
+    refused = False
     for name in names or known:
         try:
             click.echo(explained(known[name]) if name in known else _key(name, known))
         except InputError as error:  # the others are explained all the same
-            refused.append(str(error))
+            click.echo(str(error), err=True)
+            refused = True
     if refused:
-        raise InputError("\n".join(refused))
+        click.get_current_context().exit(EXIT_BAD_INPUT)
 
 
 def explained(variable: Variable) -> str:

@@ -12,6 +12,7 @@ from ringsim.cable.records import Winch
 from ringsim.cable.winding import MotorWinding
 from ringsim.outputs.family import (
     Array,
+    ErrorBar,
     Output,
     Peak,
     Reading,
@@ -70,10 +71,12 @@ class Motors(Output):
         ),
         Variable(
             "peak_motor_torque", (), "N m", "largest torque of any motor's shaft at any step",
+            error_bar=ErrorBar("largest torque of a motor", safety=1.5, of="motor_torque"),
             summary=("largest motor torque", "10.3g"), worse="larger", largest_of="motor_torque",
         ),
         Variable(
             "peak_motor_power", (), "W", "largest power of any motor's shaft at any step",
+            error_bar=ErrorBar("largest power of a motor", safety=1.5, of="motor_power"),
             summary=("largest motor power", "10.3g"), worse="larger", largest_of="motor_power",
         ),
         Variable(
@@ -121,7 +124,7 @@ class Motors(Output):
         times, winches = series.times, len(run.coordinates["winch"])
         found = np.full((4, len(times), len(run.locks), winches), np.nan)
         torque, shaft, power, energy = found
-        current, supplied, lost, lagged = np.full((4, *torque.shape), np.nan)
+        current, supplied, lost, lagged, climbed = np.full((5, *torque.shape), np.nan)
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
             tension, speed, wound, told = series.values[:, plane, end].T
@@ -131,10 +134,17 @@ class Motors(Output):
             if winch.after_lock == "stop":
                 runs &= times <= np.nan_to_num(held[plane].max(), nan=math.inf)
             on, given = runs[steps], motor.torque(tension, speed, times - winch.start_time)
+            # A rotor that is switched on stands, and has its largest torque: no step ends there.
+            low, high = (np.maximum(each, 0.0) / motor.travel for each in (speed[:-1], speed[1:]))
+            up = runs[:-1] & motor.runs_up(speed, times - winch.start_time)[:-1] & (high > low)
+            starts = np.flatnonzero(up & (low == 0.0))
+            given[starts] = motor.available(0.0)
             found[:, :, plane, end] = np.nan_to_num(found[:, :, plane, end])
             place, before = (steps, plane, end), np.maximum(steps - 1, 0)
             torque[place] = np.where(on, given[steps], 0.0)
             shaft[place] = speed[steps] / motor.travel
+            climbs = np.append(0.0, np.where(up, motor.largest_power(low, high), 0.0))
+            climbed[place] = climbs[steps]
             # Also of a step at whose end the winch is switched off: its drum turned until then.
             turned = (wound[steps] - wound[before]) / motor.travel
             energy[place] = 0.5 * (given[steps] + given[before]) * turned
@@ -166,10 +176,18 @@ class Motors(Output):
         if "torque_constant" in holds(run.scene):
             taken = energy + np.cumsum(lost, axis=0)
             values |= _electrical(series, current, supplied, supplied - power, taken)
-        for peak, own in zip(self.peaks, (torque, power, current), strict=True):
+        each = [motor for *_, motor in _motors(run)]
+        # Between readings nothing is above the line of the motor, as a parabola may be.
+        bounds = (
+            max((one.available(0.0) for one in each), default=math.inf),
+            max((float(one.largest_power(0.0, one.free_speed)) for one in each), default=math.inf),
+            math.inf,
+        )
+        largest = torque, np.fmax(power, climbed), current
+        for peak, own, bound in zip(self.peaks, largest, bounds, strict=True):
             if np.isfinite(own).any():  # no current of motors that do not tell their constant
                 most, places = peak.of(run, times, own)
-                values |= places | {peak.name: np.asarray(most)}
+                values |= places | {peak.name: np.asarray(min(most, bound))}
         values["total_motor_energy"] = np.nansum(energy[-1])
         if np.isfinite(lagged).any():
             known = np.isfinite(lagged).any(axis=0)

@@ -88,6 +88,7 @@ class NetTension(Output):
         ),
         Variable(
             "peak_net_tension", (), "N", "largest tension of any cable along the net's edge",
+            error_bar=ErrorBar("largest net tension", safety=1.5, of="net_tension"),
             summary=("largest net tension", "10.4f"), worse="larger", largest_of="net_tension",
         ),
         *PEAK_OF_NET.variables,

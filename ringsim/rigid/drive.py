@@ -192,15 +192,18 @@ class Drive:
         """The cables that there are."""
         return [cable for _, cable in self._cables]
 
-    def jammed(self, friction: float) -> list[int]:
-        """Planes whose pulleys pass on no tension at so many times their friction: its law has no
-        solution any more.
+    def jammed(self, over: Sequence[Reeved], friction: float) -> dict[int, int]:
+        """How many pulleys of each plane pass on no tension at so many times their friction, as
+        they are ``reeved``: its law has no solution there.  Planes without any are left out.
         """
-        return [
-            number
-            for number, cable in self._cables
-            if cable.friction.factored(friction).refusal(cable.pulley_radius) is not None
-        ]
+        found = {}
+        for (number, cable), reeved in zip(self._cables, over, strict=True):
+            law = cable.friction.factored(friction)
+            none = np.zeros(len(reeved.angles))
+            steps = law.bound_decay(Pulleys(reeved.angles, none, none + 1.0), cable.pulley_radius)
+            if count := int(np.isneginf(steps).sum()):
+                found[number] = count
+        return found
 
     def reeved(self, now: Configuration) -> list[Reeved]:
         """All cables on a mechanism at its coordinate."""

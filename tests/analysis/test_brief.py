@@ -331,34 +331,74 @@ def test_differences_of_rounding_are_told_as_zero_and_narrow_ranges_with_all_the
     assert "peak_motor_power" in [row[0] for row in rows]
 
 
+def brief(made, wanted=None):
+    """The sentences in short on a made campaign."""
+    return sections(analyse(made, wanted), full=False)["short"].tables[0].notes
+
+
 def test_the_sentences_on_top_say_what_the_tables_say():
     """Of a made campaign whose truth is known: x1 decides, and 40 % violate a limit."""
     made = drawn_campaign(RandomDesign(samples=400), linear, 3, 4)
-    limit = float(np.sort(made["asynchrony_max"].values)[239])
+    values = made["asynchrony_max"].values
+    limit = float(np.sort(values)[239])
     wanted = {
         "asynchrony_max": {"max": limit, "probability": 0.9, "confidence": 0.9},
         "peak_tension": {"max": 1e9, "probability": 0.9, "confidence": 0.9},
     }
     made["peak_tension"] = "sample", np.linspace(1.0, 2.0, 400), {"units": "N"}
-    lines = sections(analyse(made, wanted), full=False)["short"].tables[0].notes
+    lines = brief(made, wanted)
     said = "\n".join(lines)
     assert "of 400 samples: deployed 400" in lines
-    assert re.search(
-        r"^requirements not met: asynchrony_max <= .* deg \(160 of 400 violate it\)$", said, re.M
+    text = (
+        r"^requirements not met: asynchrony_max <= .* deg in 0.9 of all \(160 of 400 violate it\)$"
     )
-    assert re.search(r"^requirements met: peak_tension <= 1e\+09 N$", said, re.M)
-    separated = re.search(
-        r"^what separates violates .* \(160\) from the others: x1, larger", said, re.M
-    )
-    assert separated
-    assert "asynchrony_max goes most with x1 and x2" in lines
-    # Nothing matters for a row of numbers: no sentence on it.
-    assert "peak_tension goes" not in said
+    assert re.search(text, said, re.MULTILINE)
+    assert "requirements met: peak_tension <= 1e+09 N in 0.9 of all" in lines
+    text = r"^samples that violate asynchrony_max .* \(160\) differ by x1: larger in "
+    assert re.search(text, said, re.MULTILINE)
+    (line,) = (line for line in lines if line.startswith("asynchrony_max: "))
+    mean, worst, sample, found = re.fullmatch(
+        r"asynchrony_max: mean (\S+) deg, worst (\S+) deg in sample (\d+); goes most with (.*)",
+        line,
+    ).groups()
+    assert float(mean) == pytest.approx(values.mean(), rel=0.01)
+    assert float(worst) == pytest.approx(values.max(), rel=1e-3)
+    assert int(sample) == values.argmax()
+    assert found == "x1 and x2"
+    # Nothing matters for a row of numbers.
+    (line,) = (line for line in lines if line.startswith("peak_tension: "))
+    assert "goes most" not in line
 
 
-def test_the_sentences_name_the_larger_error():
+def test_the_sentences_name_the_larger_error_as_far_as_it_is_known():
     made = drawn_campaign(RandomDesign(samples=400), linear, 3, 4)
-    for bar, source in ((0.3, "of steps and elements"), (1e-6, "of the draw")):
+    for bar, source in ((0.3, "numerical"), (1e-6, "sampling")):
         made["asynchrony_max_error"] = "sample", np.full(400, bar), {"units": "degree"}
-        lines = sections(analyse(made), full=False)["short"].tables[0].notes
-        assert f"the largest error of a mean is that {source} in asynchrony_max" in lines
+        told = f"largest error of a mean: {source} in asynchrony_max"
+        assert told in brief(made)
+
+
+def test_of_designs_that_repeat_values_only_the_samples_count_that_do():
+    made = drawn_campaign(Saltelli(samples=64, replicates=8), linear, 3, 4)
+    run = made.sizes["sample"]
+    assert f"of 128 samples that count, of {run} that ran: deployed 128" in brief(made)
+
+
+def test_failed_and_unfinished_runs_are_told_and_are_no_output():
+    made = drawn_campaign(RandomDesign(samples=400), linear, 3, 4)
+    lost = made["x1"].values.reshape(-1) > np.sort(made["x1"].values.reshape(-1))[340]
+    for name in ("asynchrony_max",):
+        made[name] = "sample", np.where(lost, np.nan, made[name].values), made[name].attrs
+    made["status"] = "sample", np.where(lost, 2, 0), made["status"].attrs
+    wanted = {"asynchrony_max": {"max": 1e3, "probability": 0.9, "confidence": 0.9}}
+    lines = brief(made, wanted)
+    (line,) = (line for line in lines if line.startswith("requirements "))
+    assert "(59 failed runs)" in line
+    assert not [line for line in lines if line.startswith("failed runs") and "goes most" in line]
+    assert [line for line in lines if line.startswith("failed runs (59) differ by x1: larger in ")]
+
+
+def test_a_campaign_that_has_not_run_says_so():
+    made = drawn_campaign(RandomDesign(samples=8), linear, 3, 4)
+    made["status"] = "sample", np.full(8, -1), made["status"].attrs
+    assert brief(made) == ["no sample has run yet"]

@@ -259,7 +259,8 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     samples[:8] = 50.0 * whole[:8]
     barred = SimpleNamespace(**half, unchecked=lambda: np.empty(0, dtype=int))
     assert whole[0] > 2.0 * whole[9]
-    assert time_left(barred, 1) == f"about {100.0 * whole[9]:.0f} s"
+    told = f"about {100.0 * whole[9]:.0f} s (costly samples come first)"
+    assert time_left(barred, 1) == told
 
 
 def test_a_worker_that_runs_a_check_runs_no_samples(copied):

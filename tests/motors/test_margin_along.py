@@ -17,7 +17,7 @@ from ringsim.dataset import save
 from ringsim.layout.layout import layout_of
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.rigid.margin import DriveMargin, Passed, least_along, passed, with_margin
-from ringsim.scene import Scene
+from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 from ringsim.stored_state import read_state
 from ringsim.variables import PLANES, Outcome, Status
@@ -327,3 +327,17 @@ def test_a_plane_counts_what_it_passed_until_it_has_locked() -> None:
     run.values["lock_time"] = np.repeat([[1.0], [np.nan]], 6, axis=1)
     found = with_margin(run, stopped).values["least_drive_margin_plane"]
     assert found[0] == pytest.approx(truth.margin, rel=1e-9)
+
+
+@pytest.mark.parametrize("struck", [True, False])
+def test_a_ring_at_rest_names_the_faults_that_had_struck(struck: bool) -> None:
+    cut = {"kind": "cut-cable", "cable": "lower", "span": 3, "time": 2.0}
+    stop = {"cables.lower.winch.stop_time": 2.0}
+    few = {"structure.sections": 4, "record.interval": 1.0} | (
+        {"faults": [cut]} if struck else stop
+    )
+    found = simulate(load_scene("ring18-motor").with_values(few), fidelity="frame")
+    why = found.attrs["reason"].split("; ")[0]
+    assert why.startswith("came to rest with ")
+    assert why.endswith(", after cut-cable at 2 s") == struck
+    assert ("after" in why) == struck

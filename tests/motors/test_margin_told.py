@@ -211,7 +211,7 @@ def test_a_run_draws_what_resists_and_its_least_margin(
 
 
 def test_pulleys_that_the_standards_factor_jams_are_told(tmp_path: Path) -> None:
-    """A bearing of f/R = 0.4 has 1.2 with a factor of 3: no tension behind its pulleys."""
+    """A bearing of f/R = 0.4 has 1.2 with a factor of 3: no tension where the rope turns far."""
     path = "cables.upper.friction.coefficient"
     told_of = {
         share: told(tmp_path / "one.toml", load_scene("ring18-motor").with_values({
@@ -219,9 +219,27 @@ def test_pulleys_that_the_standards_factor_jams_are_told(tmp_path: Path) -> None
         }))
         for share in (0.3, 0.4)
     }  # fmt: skip
-    line = "  cables.upper: with 3 times its friction a pulley passes on no tension"
-    assert [line in text for text in told_of.values()] == [False, True]
+    line = r"^  cables.upper: with 3 times its friction up to (\d+) pulleys pass on no tension, at "
+    found = [re.search(line, text, re.MULTILINE) for text in told_of.values()]
+    assert found[0] is None
+    assert found[1] is not None
+    assert 1 <= int(found[1][1]) <= 53
     assert "cables.lower: with" not in told_of[0.4]
+
+
+def test_check_names_a_plane_whose_own_cable_falls_short(tmp_path: Path) -> None:
+    """Where both together are enough: a run says so, too."""
+    stall = {
+        f"cables.{p}.winch.winding.stall_torque": t for p, t in (("upper", 0.1), ("lower", 0.002))
+    }
+    for values, wanted in ((stall, True), (dict.fromkeys(stall, 0.1), False)):
+        path = tmp_path / "one.toml"
+        path.write_text(load_scene("ring18-motor").with_values(values).to_toml())
+        last = CliRunner().invoke(cli, ["check", str(path)]).stdout.splitlines()[-1]
+        assert (
+            last.startswith("valid, but the lower plane's own cable has least margin -0.") == wanted
+        )
+        assert (last == "valid: ringsim run FILE runs it") != wanted
 
 
 @pytest.mark.parametrize(

@@ -230,6 +230,28 @@ def test_motors_tell_how_long_they_were_slower_than_commanded(fidelity: str) -> 
     assert (found.motor_lag_duration == 0.0).all()
 
 
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+@pytest.mark.parametrize("speed", [150.0, 450.0])
+def test_a_rotor_without_a_ramp_begins_with_its_stall_torque(speed: float, fidelity: str) -> None:
+    """Its torque falls along its line from the stall torque as soon as it is on, and its power is
+    that of the parabola w T (1 - w / w_0), of which it passes the top or comes to the command:
+    closed forms, which no step has to meet.
+    """
+    rotor = MOTOR | {"speed": speed, "rotor_inertia": 1e-7, "stall_torque": 0.01}
+    values = {f"cables.{plane}.winch.winding": rotor for plane in ("upper", "lower")}
+    scene = ring(structure__sections=3, solver__end_time=0.1, record__interval=0.01)
+    found = simulate(scene.with_values(values), fidelity)
+    assert float(found.peak_motor_torque) == pytest.approx(0.01, rel=1e-9)
+    assert float(found.peak_motor_torque_time) == 0.0
+    top = min(speed, 300.0)
+    assert float(found.peak_motor_power) == pytest.approx(
+        0.01 * top * (1.0 - top / 600.0), rel=1e-3
+    )
+    # Later on a stronger rope may ask for more than the line leaves, and never for more than that.
+    line = 0.01 * (1.0 - found.motor_speed / 600.0)
+    assert bool((found.motor_torque <= line * (1.0 + 1e-9)).all())
+
+
 def test_a_ramp_takes_the_jump_from_the_first_steps() -> None:
     peaks = {}
     for ramp in (None, 0.5):

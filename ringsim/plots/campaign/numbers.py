@@ -165,7 +165,9 @@ def _converges(campaign: xr.Dataset) -> bool:
 
 
 def _counts(samples: int, most: int) -> NDArray[np.int64]:
-    return np.unique(np.linspace(1, samples, min(most, samples)).astype(int))
+    # Bounds bend most where samples are few: a third of the counts grow by a ratio.
+    even, early = np.linspace(1, samples, most - most // 3), np.geomspace(1, samples, most // 3)
+    return np.unique(np.concatenate([even, early]).astype(int))
 
 
 def running(values: Array, level: float = 0.95) -> tuple[NDArray[np.int64], Array, Array]:
