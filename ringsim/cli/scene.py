@@ -365,11 +365,12 @@ def _jammed(scene: Scene, drive: DriveMargin, angles: Sequence[float]) -> Iterat
         for plane, count in drive.drive.jammed(over, drive.standard.friction).items():
             found.setdefault(plane, []).append((math.degrees(angle), count))
     for plane, each in found.items():
+        first, last = each[0][0], each[-1][0]
         yield (
             f"  cables.{scene.structure.planes[plane]}: with {drive.standard.friction:g} times its "
             f"friction up to {counted(max(count for _, count in each), 'pulley')} pass on no "
-            f"tension, at {', '.join(f'{angle:.0f}' for angle, _ in each)} deg: what lies behind "
-            "them drives nothing"
+            f"tension, at angles between {first:.0f} and {last:.0f} deg: what lies behind them "
+            "drives nothing"
         )
 
 

@@ -124,8 +124,8 @@ def test_a_limit_that_is_passed_and_a_margin_that_is_short_are_told_above_the_ve
     made = with_limits(with_motors(made_campaign(8, failed=(0,))), tension=20.0)
     wanted = {"asynchrony_max": {"max": 90.0, **BOUND}}
     lines = told(analyse(made, wanted))
-    (passed,) = (k for k, line in enumerate(lines) if line.startswith("limits.tension = 20 N"))
-    (short,) = (k for k, line in enumerate(lines) if line.startswith("least_drive_margin >= 0"))
+    _, passed = (k for k, line in enumerate(lines) if line.startswith("limits.tension = 20 N"))
+    _, short = (k for k, line in enumerate(lines) if line.startswith("least_drive_margin >= 0"))
     # 20 / 27 - 1; all but the lost one are beyond.
     assert lines[passed].split()[-7:] == ["-0.259:", "NOT", "enough", "7", "7", "of", "7"]
     least = made["least_drive_margin"].values[1:]
