@@ -369,17 +369,17 @@ def of_difference(
     return apart - half, apart + half
 
 
-# Arithmetic of shares: intervals of one, exact, and of differences; samples that are needed.
-
-
 def by_signs(ends: tuple[Any, Any], apart: Array) -> tuple[Any, Any]:
-    """The interval of a mean of pairs' differences, with zero in it where so few pairs differ that
-    chance may have given all of them one sign (2 / 2^k, two-sided): 3 of 60 tell no direction.
-    Pairs differ by more than a hundredth of the largest difference: the others are beside them.
+    """The interval of a mean of pairs' differences, with zero in it where so few make it (above 1 %
+    of the largest) that chance may have given them one sign (2 / 2^k), and all signs tell no more.
     """
-    count = np.count_nonzero(np.abs(apart) > 0.01 * np.abs(apart).max(initial=0.0))
-    few = count < len(apart) and 2.0 ** (1 - count) > 1.0 - LEVEL
-    return (min(ends[0], 0.0), max(ends[1], 0.0)) if few and np.isfinite(ends).all() else ends
+    made = np.count_nonzero(np.abs(apart) > 0.01 * np.abs(apart).max(initial=0.0))
+    signs = scipy.stats.binomtest(np.count_nonzero(apart > 0.0), np.count_nonzero(apart) or 1)
+    told = min(2.0 ** (1 - made), signs.pvalue) <= 1.0 - LEVEL or made == len(apart)
+    return ends if told or np.isnan(ends).any() else (min(ends[0], 0.0), max(ends[1], 0.0))
+
+
+# Arithmetic of shares: intervals of one, exact, and of differences; samples that are needed.
 
 
 def share_interval(count: int, samples: int) -> Interval:

@@ -481,7 +481,7 @@ def in_short(analysis: xr.Dataset, parts: Parts) -> list[str]:
         return ["no sample has run yet"]
     left = [f"{samples - run} of {counted(samples, 'sample')} have not run yet"] * (run < samples)
     if event := parts.event.rows:  # its chains of samples stand for no share of all antennas
-        first = "; ".join(f"{what} {found}" for what, found in event[:2])
+        first = "; ".join(f"{what}{':' * (',' in what)} {found}" for what, found in event[:2])
         return [f"{parts.event.head[1]}: {first}", *parts.event.notes, *left]
     told = [*_did(analysis, run), *left]
     names = analysis["requirement"].values.tolist() if "requirement" in analysis.dims else []

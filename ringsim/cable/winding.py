@@ -351,8 +351,8 @@ class MotorWinding(FeedbackWinding):
 
     def largest_power(self, low: Any, high: Any) -> Any:
         """Largest power of a shaft that runs up from a speed to another (rad/s) with all the torque
-        that it has, W: its speed is a parabola below half of that without a load, or where the
-        limit ends.
+        that it has, W.  Along the line power is a parabola of the speed, largest at half of that
+        without a load; below the speed at which a limit ends it grows in proportion.
         """
         half = 0.5 * self.free_speed
         knee = self.free_speed - self.no_load_speed * self.limit / self.stall_torque

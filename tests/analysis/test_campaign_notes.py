@@ -48,6 +48,18 @@ def test_the_numerical_error_of_a_sample_that_is_named_stands_beside_its_value()
     assert sum("error_bars_every" in line for line in peak_lines(made)) == 1
 
 
+def test_a_largest_value_is_rounded_once() -> None:
+    """15.065022 is 15.07 in four digits, and 15.065 in five would be 15.06."""
+    where = {"time": [5.0] * 5, "plane": ["upper"] * 5, "span": [1] * 5}
+    made = made_campaign(5)
+    made = made.assign({f"peak_tension_{k}": ("sample", v) for k, v in where.items()})
+    made["peak_tension"] = "sample", [1.0, 15.065022, 2.0, 3.0, 4.0], {"units": "N"}
+    for bars in ([np.nan] * 5, [0.31, np.nan, np.nan, np.nan, np.nan]):
+        lines = peak_lines(made.assign(peak_tension_error=("sample", bars)))
+        (line,) = (line for line in lines if "tension in sample 1" in line)
+        assert "15.07 N" in line
+
+
 def test_another_worst_value_by_the_full_engine_stands_beside_it() -> None:
     made = made_campaign(5)
     where = {"time": [5.0] * 5, "plane": ["upper"] * 5, "span": [1] * 5}

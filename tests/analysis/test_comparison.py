@@ -491,3 +491,10 @@ def test_few_pairs_that_differ_tell_no_direction(moved):
         assert middle == pytest.approx(-12.0 * moved / 60, abs=1e-3)
         assert (high >= 0.0) == (moved < 6)
         assert low < middle
+
+
+def test_one_pair_far_off_does_not_hide_what_all_pairs_say():
+    more = np.full(60, 0.05)
+    more[7] = 12.0
+    low, _, _ = difference(compare(seeded(np.full(60, 24.0)), seeded(24.0 + more)))
+    assert low > 0.0

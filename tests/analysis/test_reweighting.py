@@ -69,6 +69,22 @@ def test_verdicts_are_those_of_the_other_distribution():
     assert "as drawn " not in "\n".join(told(analyse(made, wanted)))
 
 
+def test_a_requirement_that_all_samples_break_is_bounded_as_one_that_none_breaks():
+    """Exactly, and within the interval of the share, whose confidence is the larger one."""
+    made = drawn_campaign(RandomDesign(samples=300), linear, 2, 1)
+    ends = {}
+    for most in (-1.0, 11.0):
+        wanted = {"asynchrony_max": {"max": most, "probability": 0.9, "confidence": 0.9}}
+        found = analyse(made, wanted, {"x1": NARROW})
+        ends[most] = found.reweighted_bounds.values[0]
+        share = found.sel(event=f"asynchrony_max <= {most:g} deg")
+        low, high = share.reweighted_share_interval.values
+        assert low <= ends[most][0] or most < 0.0
+        assert ends[most][1] <= high or most > 0.0
+    np.testing.assert_allclose(ends[-1.0], 1.0 - ends[11.0][::-1], rtol=1e-9, atol=1e-12)
+    assert ends[-1.0][0] == 0.0
+
+
 STANDARD = read_distributions({"x": {"kind": "normal", "mean": 0.0, "standard_deviation": 1.0}})[
     "x"
 ]

@@ -7,7 +7,7 @@ from scipy.stats import norm
 
 from made import drawn_campaign
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import told
+from ringsim.analysis.study_text import sections, told
 from ringsim.analysis.tails import tail_table
 from ringsim.plots.campaign.tornado import explained
 from ringsim.sampling.designs.levels import SubsetSimulation
@@ -72,3 +72,13 @@ def test_samples_of_chains_are_not_judged_as_independent():
     # The same samples of a list of values have correlations.
     listed = analyse(made.assign_attrs(design='{"kind": "list"}'))
     assert "asynchrony_max_rank_correlation" in listed
+
+
+def test_the_sentences_on_top_tell_the_event_and_no_share_of_chains():
+    wanted = {"asynchrony_max": {"max": 1.0, "probability": 0.9, "confidence": 0.9}}
+    for levels, begins in ((8, "probability 0.01"), (1, "probability below ")):
+        found = analyse(campaign(2.5 if levels == 8 else 7.0, levels), wanted)
+        first, *notes = sections(found, full=False)["short"].tables[0].notes
+        assert first.split(": ", 1)[1].startswith(begins)
+        assert first.startswith("asynchrony_max > ")
+        assert not [line for line in (first, *notes) if "violate" in line]

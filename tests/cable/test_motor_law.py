@@ -205,3 +205,14 @@ def test_a_motor_rises_along_the_quintic_of_a_ramp():
     small = 1e-6
     ahead, behind = (ramped.commanded(times[1:-1] + by)[0] for by in (small, -small))
     assert rate[1:-1] == pytest.approx((ahead - behind) / (2.0 * small), abs=1e-5)
+
+
+@for_each("fields", [{}, {"torque_limit": 0.001}, {"voltage": 0.8, "derating": 0.9}])
+def test_the_largest_power_on_the_way_up_is_that_of_the_line(fields):
+    """Beside 20,000 speeds of the way, also where a limit cuts the line off."""
+    law = motor(**fields)
+    for low, high in ((0.0, 0.3), (0.0, 0.9), (0.4, 0.7), (0.6, 0.95)):
+        ends = low * law.free_speed, high * law.free_speed
+        speeds = np.linspace(*ends, 20_000)
+        most = (speeds * law.available(speeds)).max()
+        assert law.largest_power(*ends) == pytest.approx(most, rel=1e-6)

@@ -252,6 +252,22 @@ def test_a_rotor_without_a_ramp_begins_with_its_stall_torque(speed: float, fidel
     assert bool((found.motor_torque <= line * (1.0 + 1e-9)).all())
 
 
+def test_a_rotor_that_starts_later_has_its_stall_torque_then() -> None:
+    """And gives its rope and its own run-up what they take: energy of the shafts."""
+    rotor = MOTOR | {"speed": 300.0, "rotor_inertia": 1e-6}
+    values = {f"cables.{plane}.winch.winding": rotor for plane in ("upper", "lower")}
+    values |= {f"cables.{plane}.winch.start_time": 0.05 for plane in ("upper", "lower")}
+    scene = ring(structure__sections=3, solver__end_time=0.5, solver__tolerance=1e-3)
+    found = simulate(scene.with_values(values), "frame")
+    assert float(found.peak_motor_torque) == pytest.approx(MOTOR["stall_torque"], rel=1e-9)
+    assert float(found.peak_motor_torque_time) == pytest.approx(0.05, abs=1e-9)
+    last = found.isel(winch=0, time=-1)
+    kept = 0.5 * 1e-6 * float((last.motor_speed**2).sum())
+    given, work = float(last.motor_energy.sum()), float(found.work[-1])
+    assert kept > 0.2 * given
+    assert given == pytest.approx(work / 0.6 + kept, rel=1e-2)
+
+
 def test_a_ramp_takes_the_jump_from_the_first_steps() -> None:
     peaks = {}
     for ramp in (None, 0.5):
