@@ -291,10 +291,17 @@ def _other_kinds_key(path: list[str], owner: type[BaseModel] | None) -> str:
     if owner is None or other is None:
         return ""
     mine, table = show(_tag(owner)), ".".join(path[:-1])
+    own = [name for name in owner.model_fields if name != "kind"]
+    # Such a kind may say the same by another key, as "cable" for "plane".
+    keys = f"; {mine} has {', '.join(own)}" * (0 < len(own) <= _FEW_KEYS)
     return (
         f"kind = {show(_tag(other))} has it, {mine} has not: leave it out, or replace the whole "
-        f"table by {table} = {{ kind = {mine} }}"
+        f"table by {table} = {{ kind = {mine} }}{keys}"
     )
+
+
+_FEW_KEYS = 6
+"""Keys of a kind that are all named in a line."""
 
 
 def _walk(

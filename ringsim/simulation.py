@@ -31,7 +31,7 @@ from ringsim.stepping.ending import run_with_restarts
 from ringsim.stepping.instant import Instant, Watch
 from ringsim.stored_state import require_fit
 from ringsim.threads import one_thread
-from ringsim.variables import GONE, Cause, Fate, Fidelity, Outcome, Status
+from ringsim.variables import AT_REST, GONE, Cause, Fate, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -192,7 +192,7 @@ def _after_faults(outcome: Outcome, scene: Scene) -> Outcome:
     """The outcome; of a ring that came to rest short of its goal its reason names the faults that
     had struck by then.
     """
-    if outcome.status.failed or outcome.fate not in (Fate.STALLED, Fate.PARTLY_DEPLOYED):
+    if outcome.status.failed or outcome.fate not in AT_REST:
         return outcome
     end = float(outcome.values["final_time"])
     struck = [f"{kind_of(one)} at {one.time:.4g} s" for one in scene.faults if one.time <= end]

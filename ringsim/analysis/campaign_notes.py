@@ -41,12 +41,13 @@ from ringsim.analysis.intervals import (
     used,
     worst_sample,
 )
-from ringsim.analysis.requirements import OUTCOME
+from ringsim.analysis.requirements import MARGINS, OUTCOME
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
 from ringsim.outputs.base import DOUBT, UNCERTAIN, may_be_off, without_doubts
 from ringsim.outputs.family import Array
+from ringsim.outputs.motors import left_by_winches
 from ringsim.overrides import flat
 from ringsim.sampling.distributions import labels_of
 from ringsim.tables import (
@@ -58,7 +59,7 @@ from ringsim.tables import (
     readable,
     with_unit,
 )
-from ringsim.variables import Fate, Variable
+from ringsim.variables import AT_REST, Fate, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -229,10 +230,32 @@ def plane_line(campaign: xr.Dataset) -> str:
     own = np.where(good(campaign), numbers(campaign, name), np.nan)
     k, short = int(np.nanargmin(own)), int((own < 0.0).sum())
     word = f"NOT enough in {_of(short, int(np.isfinite(own).sum()))}" if short else "enough"
+    word += " for a rigid ring" * (not short and bool(rigid_line(campaign)))
     when = " from the start of the last winch on" * name.endswith(_STARTED)
     return (
         f"the least drive margin of one plane's own cable{when} is {own[k]:.3f} "
         f"(sample {int(campaign['sample'][k])}): {word}"
+    )
+
+
+def rigid_line(campaign: xr.Dataset) -> str:
+    """In how many samples the least drive margin is enough, and the ring came to rest all the same
+    while it was driven; empty if in none.
+    """
+    margin = numbers(campaign, "least_drive_margin")
+    known = good(campaign) & np.isfinite(margin)
+    if OUTCOME not in campaign or not known.any():
+        return ""
+    places = np.flatnonzero(known & (margin >= 0.0) & np.isin(campaign[OUTCOME], AT_REST))
+    if "drive_margin" in campaign:
+        courses = campaign["drive_margin"].isel(sample=places).transpose("sample", "time")
+        places = places[[not left_by_winches(course) for course in courses.to_numpy()]]
+    if not len(places):
+        return ""
+    return (
+        f"in {_of(len(places), int(known.sum()))} the least drive margin is enough and the ring "
+        "came to rest before it was deployed: margins are those of a rigid ring, which opens as "
+        "one; what sections behind a fault do, runs alone tell"
     )
 
 
@@ -320,7 +343,7 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 error += _checked(worst, variable)
                 name = variable.summary[0] + DOUBT * (f'"{variable.name}"' in says.get(OFF, ""))
                 lines.append(f"{name} in sample {sample}: {said}{error}{mark}")
-    lines += filter(None, [plane_line(sound)])
+    lines += filter(None, [plane_line(sound), rigid_line(sound)])
     if unknown:
         lines.append(
             "no sample has numerical error bars: set error_bars_every in the campaign file, or run "
@@ -429,8 +452,8 @@ DOUBTED = f"{DOUBT.strip()} may be off, since steps are too long at locks"
 """What is said below a table with that mark."""
 OFF = "may_be_off"
 """Attribute of an analysis with what ``off_note`` tells, as JSON."""
-LATE, PLANE = "late_winches", "plane_margin"
-"""Attributes with ``late_line`` and ``plane_line``."""
+LATE, PLANE, RIGID = "late_winches", "plane_margin", "rigid_margin"
+"""Attributes with ``late_line``, ``plane_line`` and ``rigid_line``."""
 RECORDED = "of_records"
 """Attribute of an analysis with ``records_line``."""
 
@@ -520,12 +543,14 @@ def attributes(campaign: xr.Dataset) -> dict[str, str]:
     counts = dict(sorted(counts.items(), key=lambda each: -each[1]))
     told = {"samples": counts, "of": int(good(campaign).sum()), "cure": cure}
     marks = {NOTE: losses(campaign).note, LATE: late_line(campaign), PLANE: plane_line(campaign)}
+    marks |= {RIGID: rigid_line(campaign)}
     return marks | ({OFF: json.dumps(told)} if counts else {})
 
 
-def drive_notes(says: Mapping[Any, Any]) -> list[str]:
-    """What is told beside the least drive margin, out of ``attributes``."""
-    return [told for each in (LATE, PLANE) if (told := says.get(each))]
+def drive_notes(says: Mapping[Any, Any], name: str = MARGINS[0]) -> list[str]:
+    """What is told beside a margin, by default the least of the drive, out of ``attributes``."""
+    beside = dict.fromkeys(MARGINS, (RIGID,)) | {MARGINS[0]: (LATE, PLANE, RIGID)}
+    return [told for each in beside.get(name, ()) if (told := says.get(each))]
 
 
 def off_counts(says: Mapping[Any, Any]) -> dict[str, str]:

@@ -40,6 +40,7 @@ from ringsim.analysis.intervals import (
     quantities,
 )
 from ringsim.analysis.requirements import (
+    COUNTS,
     OUTCOME,
     badness_of,
     require_values,
@@ -175,9 +176,7 @@ def _told(
     numbers = np.array(rows).reshape(len(rows), 7)
     apart = "difference of the shares, second minus first"
     return {
-        f"{word}_samples": (
-            (dim, "side"), counts.reshape(-1, 2), about("samples of all"),
-        ),
+        f"{word}_samples": ((dim, "side"), counts.reshape(-1, 2), about("samples of all")),
         f"{word}_compared": (
             (dim, "side"), numbers[:, :2].astype("i8"),
             about("samples compared, of which the shares are"),
@@ -214,11 +213,8 @@ def _compared(
 
 def _paired(first: Any, second: Any, replicates: list[Any]) -> intervals.Interval:
     only = int((first > second).sum()), int((second > first).sum())
-    apart = second - first
-    if (
-        replicates[0] is None or sum(only) < _FEW
-        or intervals.agree(apart, replicates[0]) or not np.ptp(apart)
-    ):  # fmt: skip
+    apart, few = second - first, sum(only) < _FEW
+    if replicates[0] is None or few or intervals.agree(apart, replicates[0]) or not np.ptp(apart):
         together = int((first * second).sum())
         return difference_of_pairs(together, *only, len(first) - together - sum(only))
     low, high = intervals.of_replicates(apart, replicates[0], np.mean)
@@ -305,11 +301,13 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
         },
     )  # fmt: skip
     wanted, twins = [required_by(each.attrs) for each in (first, second)], Twins()
+    joints = {each.sizes.get("plane", 0) * each.sizes.get("section", 0) for each in (first, second)}
     for name in quantities():
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
             if f"{name}_difference" in found:
-                found[f"{name}_difference"].attrs[BADNESS] = badness_of(name, *wanted)
+                alike = name not in COUNTS or len(joints) == 1  # all of fewer joints are not fewer
+                found[f"{name}_difference"].attrs[BADNESS] = alike * badness_of(name, *wanted)
                 twin = twins.of(
                     name, np.concatenate([numbers(each, name)[good(each)] for each in (one, other)])
                 )

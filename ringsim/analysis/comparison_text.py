@@ -8,6 +8,7 @@ import xarray as xr
 from ringsim.analysis import derived
 from ringsim.analysis.campaign_notes import NOTE, marked
 from ringsim.analysis.comparison import BADNESS
+from ringsim.analysis.design import REACHED
 from ringsim.analysis.indices import largest_by_chance
 from ringsim.analysis.intervals import NOTHING, TWIN, all_alike, is_moment, quantities
 from ringsim.analysis.study_text import Section
@@ -411,8 +412,24 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
     for name, side in zip(names_of(found), ("first", "second"), strict=True):
         only = found.attrs[f"only_{side}"]
         notes += [f"in {name} alone: {only}"] * bool(only)
+    notes += _unlike_ends(found) if rows else []
     table = Table(head[:columns], [row[:columns] for row in rows], notes)
     return marked(table, found), [*flat]
+
+
+def _unlike_ends(found: xr.Dataset) -> list[str]:
+    """That numbers of rings that did not open stand beside those of rings that did."""
+    if "kind" not in found.dims:
+        return []
+    shares = found["kind_samples"] / found["kind_samples"].sum("kind")
+    came = shares.sel(kind=[k for k in found["kind"].values.tolist() if k in REACHED]).sum("kind")
+    if came[0] == came[1]:
+        return []
+    fewer = names_of(found)[int(came.values.argmin())]
+    ended = f"in {fewer} more samples ended before they were deployed: their", "they"
+    if found.attrs["runs"]:
+        ended = f"{fewer} ended before it was deployed: its", "it"
+    return [f"{ended[0]} numbers tell how far {ended[1]} came, and lower ones need not be better"]
 
 
 def _is_place(name: str) -> bool:

@@ -266,6 +266,8 @@ def _value(word: str) -> Any:
 
 COUNTS = ("locked_joints", "latched_joints")
 """Outputs that count the V-joints of an antenna."""
+MARGINS = tuple(f"least_{of}_margin{end}" for of in ("drive", "plane") for end in ("", "_started"))
+"""Outputs that are static margins of a rigid ring."""
 
 
 def beyond_joints(name: str, wanted: Requirement, joints: int) -> str:

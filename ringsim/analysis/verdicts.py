@@ -431,8 +431,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         signs = [kind.key for kind in KINDS if f" {kind.sign} " in one["requirement_text"]]
         if doubt := doubt_of(name, signs):
             notes.append(f"{one['requirement_text']}: {doubt}")
-        if name == "least_drive_margin":
-            notes += [f"{name}: {each}" for each in drive_notes(analysis.attrs)]
+        notes += [f"{name}: {each}" for each in drive_notes(analysis.attrs, name)]
         if missing := one["samples_without_value"]:
             notes.append(
                 f"{name}: violations without a value (the antenna did not get that far): {missing}"

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.campaign_notes import doubted, late_line, marked, plane_margin
+from ringsim.analysis.campaign_notes import RIGID, doubted, late_line, marked, plane_margin
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -28,7 +28,7 @@ from ringsim.analysis.design import (
 )
 from ringsim.analysis.influence import separating, standing_out
 from ringsim.analysis.intervals import ROUND_OFF, Mask, good, numbers, quantities, ran
-from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
+from ringsim.analysis.requirements import MARGINS, OUTCOME, Requirement, require_values, violations
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import exceeded
 from ringsim.overrides import flat
@@ -573,5 +573,7 @@ def margin_table(analysis: xr.Dataset) -> Table:
         + "; that of the drive is one already, with the factors of its standard"
         * any(of.startswith((_DRIVE, _PLANE)) for _, of, *_ in rows)
     ] * any(not of.startswith((_DRIVE, _PLANE)) for _, of, *_ in rows)
+    if not {*MARGINS} & {*analysis.get("requirement", xr.DataArray([])).values.tolist()}:
+        notes += filter(None, [analysis.attrs.get(RIGID)])  # else the verdict says so
     head = ("limit", "of", "worst value", "margin", "in sample", "samples beyond")
     return marked(Table(head, rows, notes, left=2), analysis, 2)

@@ -353,7 +353,7 @@ def margin_lines(scene: Scene) -> Iterator[str]:
         yield from _jammed(scene, drive, [now.angle for now in courses[name]])
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
-        yield f"{name}: {_verdict(drive.least())}"
+        yield f"{name}: {_verdict(drive.least(), _parted(scene))}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
 
 
@@ -408,6 +408,11 @@ def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
         words = drive.conditions.told(fault)
         if fault.time > AT_ONCE and words == "counted":
             words = "strikes later, not included here; a run includes it from then on"
+        elif words == "counted" and isinstance(fault, CableFault):
+            words += (
+                ", for a rigid ring: its driven sections open those behind the fault, too; whether "
+                "they do, a run tells"
+            )
         yield f"faults[{number}], {kind_of(fault)} at {fault.time:g} s: {words}"
     for where, winch in drive.conditions.winches.items():
         place = place_of_winch(scene, *where)
@@ -433,8 +438,12 @@ def _driven_apart(scene: Scene, both: DriveMargin) -> Iterator[tuple[int, str]]:
 def _equal(scene: Scene) -> bool:
     """Whether both cables are, and are struck by nothing at once."""
     assert scene.cables is not None
-    struck = any(isinstance(one, CableFault) and one.time <= AT_ONCE for one in scene.faults)
-    return scene.cables.upper == scene.cables.lower and not struck
+    return scene.cables.upper == scene.cables.lower and not _parted(scene)
+
+
+def _parted(scene: Scene) -> bool:
+    """Whether a cable is struck at once."""
+    return any(isinstance(one, CableFault) and one.time <= AT_ONCE for one in scene.faults)
 
 
 def _late(both: DriveMargin, number: int) -> bool:
@@ -464,7 +473,7 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
         yield (
             f"{plane} plane alone: its cable, with half of springs and loads, gives {share:.3g} % "
             f"of what drives with the standard's factors, against half of what resists: "
-            f"{_verdict(least)}"
+            f"{_verdict(least, _parted(scene))}"
         )
 
 
@@ -473,10 +482,10 @@ def _told(margin: float) -> str:
     return f"{margin:.3f}" if margin < MOST else "-"
 
 
-def _verdict(least: Margin) -> str:
+def _verdict(least: Margin, parted: bool = False) -> str:
     if least.margin >= MOST:
         return "nothing resists"
-    word = "enough" if least.margin >= 0.0 else "NOT enough"
+    word = f"enough{' for a rigid ring' * parted}" if least.margin >= 0.0 else "NOT enough"
     return f"least margin {least.margin:.3f} at {math.degrees(least.angle):.2f} deg: {word}"
 
 

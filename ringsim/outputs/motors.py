@@ -24,7 +24,7 @@ from ringsim.outputs.family import (
     holds,
 )
 from ringsim.parts.faults import AT_ONCE
-from ringsim.variables import Fate
+from ringsim.variables import AT_REST, Fate
 
 # What the motors of the winches give.
 
@@ -250,6 +250,13 @@ LAST_LOCK = "deployment_time"
 """What is open needs no drive any more."""
 
 
+def left_by_winches(course: Array) -> bool:
+    """Whether nobody drove a ring any more in the end, by its margins over time: then it was left
+    by its winches, and not by its own sections.
+    """
+    return bool((course[np.isfinite(course)][-1:] < 0.0).any())
+
+
 class DriveMargins(Output):
     """Static generalised forces on the opening angle of the ideal ring at the mean one of the run.
 
@@ -325,18 +332,18 @@ class DriveMargins(Output):
         names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
         word = "enough" if margin >= 0.0 else "NOT enough"
-        if margin >= 0.0 and values.get("outcome") in (Fate.PARTLY_DEPLOYED, Fate.STALLED):
-            course = np.asarray(values.get("drive_margin", ()))
-            last = course[np.isfinite(course)][-1:]
-            # A ring that nobody drives in the end was left by its winches, not by its own sections.
+        short = margin >= 0.0 and int(values.get("outcome", Fate.NONE)) in AT_REST
+        rigid = short and not left_by_winches(np.asarray(values.get("drive_margin", ())))
+        if short:
             word = (
-                "enough until the winches were switched off" if (last < 0.0).any()
-                else "enough if rods were rigid: driven sections would open the others, too"
+                "enough for a rigid ring, which opens as one; this one did not" if rigid
+                else "enough until the winches were switched off"
             )  # fmt: skip
         # Before the last winch starts one plane has no drive, as everybody knows who delays it.
         whole = float(values.get("least_plane_margin", math.nan))
         plane = float(values.get("least_plane_margin_started", whole))
         also = ", but one plane has" if margin >= 0.0 else ", and one plane even"
+        also = ", and one plane has" if rigid else also
         # Planes of a ring that sags by a hundredth of a degree are no news; one without drive is.
         own = f"{also} {plane:.3f}" if plane < min(margin - 5e-3, -5e-4) else ""
         started = float(values.get("least_drive_margin_started", math.nan))

@@ -25,7 +25,7 @@ from matplotlib.transforms import Bbox
 
 from ringsim.scene import scene_from_toml
 from ringsim.tables import counted, known_to, readable, unit_behind
-from ringsim.variables import Fate, Status
+from ringsim.variables import AT_REST, Fate, Status
 
 # Words inside axes, put where they cover no curve.
 
@@ -328,7 +328,7 @@ def ending(dataset: xr.Dataset) -> str:
     reason = str(dataset.attrs.get("reason", "")).strip()
     start = "Ended" if word == "none" else word.capitalize()
     # What rests is known to do so some time later: then the time is that of the run.
-    rests = not status.failed and fate in (Fate.STALLED, Fate.PARTLY_DEPLOYED)
+    rests = not status.failed and fate in AT_REST
     start += f" {'by' if rests else 'after'} {final:.4g} s" if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
 

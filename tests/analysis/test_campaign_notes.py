@@ -17,6 +17,7 @@ from ringsim.analysis.campaign_notes import (
     plane_line,
     reached_by_words,
     remark_lines,
+    rigid_line,
 )
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import not_met, statistics_table
@@ -340,6 +341,32 @@ def test_a_plane_whose_own_cable_has_less_is_told_beside_the_margin_of_both() ->
     )
     rows = {row[0]: row[1:] for row in margin_table(analyse(made)).rows}
     assert rows["least_plane_margin_started >= 0"][-1] == "1 of 4"
+
+
+def test_a_margin_that_is_enough_of_a_ring_that_did_not_open_says_for_what() -> None:
+    """As behind a jammed pulley: its margin is that of a rigid ring."""
+    made = made_campaign(6, failed=(5,), stalled=(1, 2, 3))
+    wanted = {"least_drive_margin": {"min": 0.0, "probability": 0.5, "confidence": 0.5}}
+    made["least_drive_margin"] = "sample", np.array([0.3, 0.2, -0.1, 0.4, 0.9, 0.9])
+    course = np.ones((6, made.sizes["time"]))
+    course[:, -1] = np.nan
+    course[3, -2] = -1.0  # its winches were switched off
+    made["drive_margin"] = ("sample", "time"), course
+    assert rigid_line(made).startswith("in 1 of 5 samples the least drive margin is enough and ")
+    analysis = analyse(made, wanted)
+    assert f"least_drive_margin: {rigid_line(made)}" in verdict_table(analysis).notes
+    assert rigid_line(made) not in margin_table(analysis).notes
+    assert rigid_line(made) in margin_table(analyse(made)).notes
+    assert rigid_line(made) in peak_lines(made)
+    made["least_plane_margin"] = made["least_drive_margin"] - 0.05
+    wanted = {"least_plane_margin": wanted["least_drive_margin"]}
+    assert f"least_plane_margin: {rigid_line(made)}" in verdict_table(analyse(made, wanted)).notes
+    made["least_plane_margin"] = made["least_drive_margin"] = abs(made["least_drive_margin"])
+    made["least_plane_margin"] = made["least_plane_margin"] - 0.1 * (made["sample"] == 2)
+    assert plane_line(made).endswith("is 0.000 (sample 2): enough for a rigid ring")
+    made["outcome"] = made["outcome"] * 0 + int(Fate.DEPLOYED)
+    assert rigid_line(made) == ""
+    assert plane_line(made).endswith(": enough")
 
 
 def test_an_output_that_another_repeats_is_named_instead_of_told_twice() -> None:

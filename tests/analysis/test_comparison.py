@@ -470,6 +470,32 @@ def test_two_runs_are_compared(tmp_path):
     assert line.split() == ["asynchrony_max", "deg", "2", "2.5", "0.5", "+25", "b"]
 
 
+@pytest.mark.parametrize(("sections", "worse"), [(12, ["second"]), (6, [])])
+def test_all_of_fewer_v_joints_are_not_fewer(sections, worse):
+    runs = []
+    for count, locked in ((12, 24), (sections, 12)):
+        run = campaign([2.0], locked_joints=np.array([locked]))
+        angles = ("sample", "plane", "section"), np.zeros((1, 2, count))
+        runs.append(run.assign(opening=angles).isel(sample=0, drop=True))
+    row = next(line.split() for line in compared(compare(*runs)) if line.startswith("locked"))
+    assert row == ["locked_joints", "24", "12", "-12", "-50", *worse]
+
+
+def test_numbers_of_what_did_not_open_are_said_to_be_such():
+    ends = {0: np.full(30, Fate.DEPLOYED), 9: np.repeat([Fate.STALLED, Fate.DEPLOYED], [9, 21])}
+    made = {n: seeded(np.linspace(1.0, 2.0, 30) + n, outcome=own) for n, own in ends.items()}
+    told = "in second more samples ended before they were deployed: their numbers tell how far"
+    assert any(line.startswith(told) for line in compared(compare(made[0], made[9])))
+    told = told.replace("second", "first")
+    assert any(line.startswith(told) for line in compared(compare(made[9], made[0])))
+    assert "before they were deployed" not in str(compared(compare(made[9], made[9])))
+    runs = [each.isel(sample=0, drop=True) for each in made.values()]
+    assert any(
+        line == "second ended before it was deployed: its numbers tell how far it came, and lower "
+        "ones need not be better" for line in compared(compare(*runs))
+    )  # fmt: skip
+
+
 def test_a_run_and_a_campaign_are_not_compared(tmp_path):
     campaign([1.0]).to_netcdf(tmp_path / "campaign.nc")
     campaign([1.0]).isel(sample=0, drop=True).to_netcdf(tmp_path / "run.nc")

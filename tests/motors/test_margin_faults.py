@@ -19,7 +19,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.parts.faults import JointFault, Struck
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.rigid.margin import CABLES, DriveMargin, PlaneMargin
-from ringsim.scene import Scene
+from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 
 ECSS = EcssMechanisms()
@@ -166,6 +166,12 @@ def test_check_says_what_it_counts(tmp_path: Path) -> None:
     assert "faults[2], cut-cable at 0.5 s: strikes later, not included here; a run" in text
     assert "faults[3], failed-latch at 0 s: changes nothing" in text
     assert "cables.upper.winch: stops at 4 s; a run includes it until then\n" in text
+    jam = {"kind": "jammed-pulley", "cable": "lower", "pulley": 9, "time": 0.0}
+    strong = {f"cables.{p}.winch.winding.stall_torque": 1.0 for p in ("upper", "lower")}
+    jammed = told(load_scene("ring18-motor").with_values({"faults": [jam]} | strong))
+    assert "jammed-pulley at 0 s: counted, for a rigid ring: its driven sections open" in jammed
+    verdicts = re.findall(r"least margin .* deg: (.*)$", jammed, re.M)
+    assert [*verdicts] == ["enough for a rigid ring"] * 3  # of both planes, and of each
     stuck = told(sprung(faults=[{"kind": "stuck-vjoint", "section": 1, "time": 0.0}]))
     assert "faults[1], stuck-vjoint at 0 s: with rigid rods it holds the whole ring" in stuck
     assert re.search(r"^nasa-std-5017b: least margin -1.000 at 60.00 deg: NOT enough$", stuck, re.M)

@@ -243,7 +243,8 @@ def test_check_names_a_plane_whose_own_cable_falls_short(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("last", "told"), [(-1.0, "until the winches were switched off"), (0.7, "if rods were rigid")]
+    ("last", "told"),
+    [(-1.0, "until the winches were switched off"), (0.7, "for a rigid ring, which opens as one")],
 )
 def test_a_ring_that_stalls_is_not_blamed_on_its_rods_once_nobody_drives(
     last: float, told: str
@@ -254,6 +255,11 @@ def test_a_ring_that_stalls_is_not_blamed_on_its_rods_once_nobody_drives(
         "drive_margin": np.array([0.7, 0.9, last, np.nan]),
     }  # fmt: skip
     assert f"enough {told}" in DriveMargins().told(values, {})
+    values |= {"least_plane_margin": np.array(-0.2)}
+    also = "and" if last > 0.0 else "but"
+    assert DriveMargins().told(values, {}).endswith(f", {also} one plane has -0.200")
+    values["outcome"] = np.array(int(Fate.DEPLOYED))
+    assert DriveMargins().told(values, {}).endswith("s: enough, but one plane has -0.200")
 
 
 def test_the_drives_course_ends_below_zero_where_the_winches_stop() -> None:
