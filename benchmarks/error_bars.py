@@ -142,6 +142,8 @@ def motor_scene(seed: int) -> Scene:
         values |= {
             f"{winding}.stall_torque": log_uniform(rng, 2e-3, 2e-2),
             f"{winding}.speed": speed,
+            f"{winding}.torque_constant": 0.02,
+            f"{winding}.no_load_current": 0.01,
             f"cables.{plane}.friction.coefficient": float(rng.uniform(0.0, 8e-4)),
         }
         values |= {f"{winding}.rotor_inertia": inertia} if inertia else {}

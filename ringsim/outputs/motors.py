@@ -87,22 +87,28 @@ class Motors(Output):
         Variable(
             "longest_motor_lag", (), "s",
             "longest time that any motor was slower than commanded",
+            error_bar=ErrorBar("longest lag of a motor", safety=2.0, of="motor_lag_duration"),
             summary=("longest lag of a motor", "10.3g"), worse="larger",
             largest_of="motor_lag_duration",
         ),
         Variable(
             "total_motor_energy", (), "J", "energy that the shafts of all motors gave by the end",
+            error_bar=ErrorBar("energy of all motors", safety=1.8, of="motor_energy"),
             summary=("energy of all motors", "10.3g"), worse="larger",
         ),
         *electrical,
         Variable(
             "peak_motor_current", (), "A", "largest current of any motor at any step",
+            error_bar=ErrorBar("largest current of a motor", safety=2.7, of="motor_current"),
             needs=_CONSTANTS, summary=("largest motor current", "10.3g"), worse="larger",
             largest_of="motor_current",
         ),
         Variable(
             "total_motor_electrical_energy", (), "J",
             "electrical energy that all motors took by the end", needs=_CONSTANTS, worse="larger",
+            error_bar=ErrorBar(
+                "electrical energy of all motors", safety=1.5, of="motor_electrical_energy"
+            ),
         ),
         *(variable for peak in peaks[:2] for variable in peak.variables),
         *(replace(variable, needs=_CONSTANTS) for variable in peaks[2].variables),

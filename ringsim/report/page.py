@@ -336,9 +336,8 @@ def page(
             measured_and_computed(apart, title),
         ))  # fmt: skip
     own = (_MATTERS, "measured")
-    others, first = filling([e for e in figures if e[0] not in own], _FIRST, _ANSWERS)
-    figures = others + [each for each in figures if each[0] in own]
-    return written("page.html.j2", context | {"first": first}, figures, beside=own)
+    front, rest = filling([e for e in figures if e[0] not in own], _FIRST, _ANSWERS)
+    return written("page.html.j2", context | {"front": front, "rest": rest}, figures)
 
 
 def _turn(name: str) -> int:
@@ -371,7 +370,5 @@ def comparison_page(found: xr.Dataset, first: xr.Dataset, second: xr.Dataset) ->
             for name, each in zip(names, both, strict=True)
         ],
     }  # fmt: skip
-    # The lowest first: in print it has room below the numbers, where a high one begins a sheet.
     figures = list(figures_of_both(found, first, second))
-    figures.sort(key=lambda each: float(each[2].get_figheight()))
-    return written("compare.html.j2", context, figures)
+    return written("compare.html.j2", context | {"figure_sheets": filling(figures)[1]}, figures)

@@ -1,13 +1,14 @@
 """What all pages share: templates, figures as light as a page must be, print."""
 
 import functools
+import math
 import os
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jinja2
 import numpy as np
@@ -30,60 +31,91 @@ Drawn = list[tuple[str, str, "Figure"]]
 
 
 def written(
-    template: str, context: Mapping[str, Any], drawn: Sequence[tuple[str, str, "Figure"]],
-    beside: Collection[str] = (),
-) -> str:  # fmt: skip
-    """The page of a template: ``figures`` in it are name, words and element of each one drawn.
+    template: str, context: Mapping[str, Any], drawn: Sequence[tuple[str, str, "Figure"]]
+) -> str:
+    """The page of a template: ``figures`` in it are name, words and element of each one by name.
 
-    Those named ``beside`` are not among these, but by their names in ``beside``.  They are lines as
-    long as the page stays below ``LARGEST`` with them, then pictures.
+    They are lines as long as the page stays below ``LARGEST`` with them, then pictures.
     """
     shape, text = _shell().get_template(template), ""
     each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
-        figures = [(name, words, one.element(heavy)) for name, words, one in each]
-        text = shape.render({**context, **_apart(figures, beside)})
+        figures = {name: (name, words, one.element(heavy)) for name, words, one in each}
+        text = shape.render({**context, "figures": figures})
         if len(text.encode("utf-8")) <= LARGEST:
             break
     return text
 
 
-_SHEET, _SCALE, _CAPTION = (7.17, 10.6), 0.58, 0.4
+class Sheet(NamedTuple):
+    """Figures that share a printed sheet, by their names, and how far they are reduced for that."""
+
+    names: list[str]
+    fit: float
+
+
+_SHEET, _SCALE, _HEADING = (7.17, 10.59), 0.66, 0.42
 """Width and height of a printed sheet within its margins, size of figures on it over that as they
-are drawn, both as page.css has them, and height of a caption with the gap below it; inch."""
+are drawn, both as page.css has them, and height of the heading above the first figures; inch."""
+_LEAST_FIT = 0.92
+"""Letters of figures that are reduced so far have 5.5 pt instead of 6: hardly another size."""
+_LINE, _LETTERS, _GAP = 0.135, 125, 0.15
+"""Height of a line of a caption (inch), letters on it, and its distance from figures (inch)."""
 
 
-def filling(drawn: Drawn, first: int = 0, more: Collection[str] = ()) -> tuple[Drawn, int]:
-    """Figures in an order that leaves little of the sheets of a printed page empty.
+def filling(
+    drawn: Drawn, first: int = 0, more: Collection[str] = ()
+) -> tuple[list[Sheet], list[Sheet]]:
+    """Figures by sheets of a printed page: the ``first`` of them, with those named in ``more`` for
+    which their sheets have room, and all others.
 
-    The ``first`` of them stay where they are, with those named in ``more`` for which their last
-    sheet has room; each other one moves up to the first sheet that has some.  Returns them, and how
-    many stay.
+    A figure moves up to the first sheet that has room for it.  Of the others' sheets the emptiest
+    comes first, since it may find room below text.
     """
-    kept, rest, room = list(drawn[:first]), list(drawn[first:]), 0.0
-    for each in kept:
-        size = _printed(each)
-        room = (room if room >= size else _SHEET[1]) - size
-    for each in [each for each in rest if each[0] in more and kept]:
-        if (size := _printed(each)) <= room:
-            room -= size
-            kept.append(each)
-            rest.remove(each)
-    sheets = list[tuple[float, Drawn]]()
-    for each in rest:
-        size = _printed(each)
-        fits = (k for k, (free, _) in enumerate(sheets) if free >= size)
-        if (k := next(fits, None)) is None:
-            sheets.append((_SHEET[1] - size, [each]))
-        else:
-            sheets[k] = sheets[k][0] - size, [*sheets[k][1], each]
-    return [*kept, *(each for _, own in sheets for each in own)], len(kept)
+    front = _Sheets(_SHEET[1] - _HEADING)
+    for each in drawn[:first]:
+        front.put(each)
+    late = [each for each in drawn[first:] if each[0] in more and front.sheets]
+    moved = [each[0] for each in late if front.put(each, anew=False)]
+    rest = _Sheets(_SHEET[1])
+    for each in drawn[first:]:
+        if each[0] not in moved:
+            rest.put(each)
+    return front.told(), sorted(rest.told(), key=lambda sheet: rest.height_of(sheet.names))
 
 
-def _printed(drawn: tuple[str, str, "Figure"]) -> float:
-    """Height of a figure with its caption on paper, inch."""
-    wide, high = map(float, drawn[2].get_size_inches())
-    return min(_SCALE, _SHEET[0] / wide) * high + _CAPTION
+class _Sheets:
+    """Sheets, of which the first has less room than all others (inch)."""
+
+    def __init__(self, first: float) -> None:
+        self.sheets: list[list[str]] = []
+        self._first, self._sizes = first, dict[str, tuple[float, float]]()
+
+    def put(self, drawn: tuple[str, str, "Figure"], *, anew: bool = True) -> bool:
+        """Put a figure on the first sheet that has room, or ``anew`` on another; whether it was."""
+        name, words, figure = drawn
+        wide, high = map(float, figure.get_size_inches())
+        caption = _GAP + _LINE * math.ceil(len(words) / _LETTERS)
+        self._sizes[name] = min(_SCALE, _SHEET[0] / wide) * high, caption
+        for k, names in enumerate(self.sheets):
+            if self._fit(k, [*names, name]) >= _LEAST_FIT:
+                names.append(name)
+                return True
+        self.sheets += [[name]] * anew
+        return anew
+
+    def told(self) -> list[Sheet]:
+        """All sheets."""
+        return [Sheet(own, min(1.0, self._fit(k, own))) for k, own in enumerate(self.sheets)]
+
+    def height_of(self, names: Sequence[str]) -> float:
+        """Of figures with their captions, inch."""
+        return sum(map(sum, (self._sizes[name] for name in names)))
+
+    def _fit(self, sheet: int, names: Sequence[str]) -> float:
+        """How far figures must be reduced to fit; captions are not."""
+        figures, captions = map(sum, zip(*(self._sizes[name] for name in names), strict=True))
+        return ((_SHEET[1] if sheet else self._first) - captions) / figures
 
 
 @functools.cache
@@ -95,11 +127,6 @@ def _shell() -> jinja2.Environment:
     )  # fmt: skip
     shell.filters |= {"sentence": _sentence, "head": _head, "parted": _parted}
     return shell
-
-
-def _apart(figures: list[tuple[str, str, str]], names: Collection[str]) -> dict[str, Any]:
-    own = {each[0]: each for each in figures if each[0] in names}
-    return {"figures": [each for each in figures if each[0] not in own], "beside": own}
 
 
 def _sentence(line: str) -> str:

@@ -127,6 +127,12 @@ def short(file: File, said: re.Match[str]) -> None:
     assert bool(said["not"]) == bool((values < 0).any())
 
 
+def rigid(file: File, said: re.Match[str]) -> None:
+    margin = file.of("least_drive_margin")
+    at_rest = np.isin(file.values["outcome"][file.ok], [2, 3])
+    assert (int(said["count"]), int(said["of"])) == (((margin >= 0) & at_rest).sum(), len(margin))
+
+
 def tolerance(file: File, said: re.Match[str]) -> None:
     assert float(said["most"]) == file.scene["solver"]["energy_tolerance"]
 
@@ -198,6 +204,8 @@ KNOWN = {
     r"(?:, (?P<short>\d+) of them as they ended, not deployed)?(?:; largest of (?P<bars>\d+) "
     rf"error bars: (?P<bar>{N}) N \(sample (?P<sample>\d+)\))?": samples,
     rf"in sample (?P<sample>\d+) it is least at (?P<angle>{N}) deg, (?P<time>{N}) s": place,
+    r"in (?P<count>\d+) of (?P<of>\d+) samples the least drive margin is enough and the ring came "
+    r"to rest before .*": rigid,
     r"below 0 in (?P<count>\d+) of (?P<of>\d+) samples(?P<not>: NOT enough)?": short,
     rf"(?P<name>.*imbalance.*): median (?P<median>{N}), largest (?P<most>{N}) "
     r"\(sample (?P<sample>\d+)\)": balance,
@@ -240,6 +248,9 @@ def test_every_number_is_that_of_the_file(stored: tuple[File, xr.Dataset]) -> No
                 assert said, line
                 said[0][0](file, said[0][1])
                 read[said[0][0]] += 1
+    at_rest = np.isin(file.values["outcome"][file.ok], [2, 3])
+    told = bool((at_rest & (file.of("least_drive_margin") >= 0.0)).any())
+    assert bool(read.pop(rigid)) == told
     assert all(read.values()), {check.__name__: count for check, count in read.items()}
 
 

@@ -39,7 +39,7 @@ from ringsim.report import page as model
 from ringsim.report import shell
 from ringsim.report.page import page
 from ringsim.report.player import player
-from ringsim.report.shell import LARGEST, filling
+from ringsim.report.shell import LARGEST, Sheet, filling
 from ringsim.scene import load_scene
 from ringsim.shapes import COMPUTED, FROM_ANGLES
 from ringsim.tables import interval_text, number_text, slim
@@ -596,16 +596,39 @@ def test_figures_stand_where_they_fill_the_sheets_of_a_printed_page() -> None:
     def drawn(**heights: float) -> list[tuple[str, str, Figure]]:
         return [(name, "", Figure(figsize=(8.0, high))) for name, high in heights.items()]
 
-    def names(figures: list[tuple[str, str, Figure]]) -> str:
-        return "".join(name for name, *_ in figures)
+    def names(sheets: list[Sheet]) -> list[str]:
+        return ["".join(sheet.names) for sheet in sheets]
 
-    # On paper 5.2, 3.3 and 6.2 inch of 10.6: d fills what c leaves, f what e does.
+    # On paper 5.5, 3.3 and 6.6 inch of 10.6: d fills what c leaves, f what e does.
     every = drawn(a=8.3, b=5.0, c=8.3, d=5.0, e=10.0, g=10.0, f=5.0)
-    found, first = filling(every, 3, ("d", "f"))
-    assert (names(found), first) == ("abcdefg", 4)
-    assert filling(every, 3)[1] == 3
-    assert names(filling(every)[0]) == "abcdefg"
-    assert filling([], 3, ("d",)) == ([], 0)
+    front, rest = filling(every, 3, ("d", "f"))
+    assert (names(front), names(rest)) == (["ab", "cd"], ["g", "ef"])
+    front, rest = filling(every, 3)
+    assert (names(front), names(rest)) == (["ab", "c"], ["de", "gf"])
+    # A small one moves up past a large one; the heading takes room of the first sheet alone.
+    assert names(filling(drawn(a=8.3, b=10.0, c=5.0), 3)[0]) == ["ac", "b"]
+    assert names(filling(drawn(a=8.3, b=8.2), 2)[0]) == ["a", "b"]
+    assert names(filling(drawn(a=8.3, b=8.2))[1]) == ["ab"]
+    # The emptiest sheet of the others may fill what text leaves.
+    assert names(filling(drawn(a=10.0, b=5.0, c=5.0, d=4.0))[1]) == ["cd", "ab"]
+    assert filling([], 3, ("d",)) == ([], [])
+
+
+@pytest.mark.quick
+def test_figures_are_reduced_by_the_little_that_they_do_not_fit() -> None:
+    def sheets(high: float, wide: float, words: str = "") -> list[Sheet]:
+        return filling([(name, words, Figure(figsize=(wide, high))) for name in "ab"])[1]
+
+    room, scale, line, gap = 10.59, 0.66, 0.135, 0.15  # inch, as printed pages were measured
+    for high, words in ((7.0, ""), (8.4, ""), (8.0, "w" * 250)):
+        captions = 2.0 * (gap + line * (len(words) // 125))
+        (found,) = sheets(high, 8.0, words)
+        assert found.fit == pytest.approx(min(1.0, (room - captions) / (2.0 * scale * high)))
+        assert found.fit >= 0.92
+    assert [each.names for each in sheets(8.5, 8.0, "w" * 250)] == [["a"], ["b"]]
+    # Wider than a sheet it is smaller already.
+    assert len(sheets(8.5, 10.9, "w" * 250)) == 2
+    assert len(sheets(8.5, 12.0, "w" * 250)) == 1
 
 
 @pytest.mark.usefixtures("_undrawn")
