@@ -384,7 +384,7 @@ def settings(both: Both) -> dict[str, Any]:
     apart = [
         path for path in paths
         if path not in _SCENES_OWN and scenes[0].get(path) != scenes[1].get(path)
-        and path not in drawn[0] & drawn[1]  # then every sample has a value of its own
+        and path not in drawn[0] | drawn[1]  # then its samples have values of their own
         and [scene[path] for scene in scenes if path in scene] != [[]]  # all, by default
     ]  # fmt: skip
     asked = [_asked(each) for each in both]

@@ -387,6 +387,9 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
         if twin := found[f"{name}_difference"].attrs.get(TWIN):
             again.append(f"{name} is {twin}")
             continue
+        if not found.attrs["pairs"] and low == high == 0.0 and first == second:
+            alike.append(f"{name} {number_text(first)} {unit_text(unit)}".rstrip())
+            continue
         fine = digits_of(min(first, second), max(first, second))
         rows.append((
             name, unit_text(unit),
@@ -403,7 +406,8 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
         "samples", "largest difference of a pair", "in sample", "rank correlation of pairs",
     )  # fmt: skip
     columns = 8 if found.attrs["runs"] else len(head)
-    same = "the same in both" if found.attrs["runs"] else "the same in each pair"
+    same = "the same in each pair" if found.attrs["pairs"] else "the same in all samples of both"
+    same = "the same in both" if found.attrs["runs"] else same
     notes = [f"{same}: {', '.join(alike)}"] * bool(alike) + _numerical(found, [r[0] for r in rows])
     both = "in both runs" if found.attrs["runs"] else "in all samples of both"
     notes += [f"{both} {', '.join(again)}"] * bool(again)

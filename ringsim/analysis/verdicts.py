@@ -159,9 +159,7 @@ def _together(
         "together_lost": ((), int(lost(campaign).sum()), about("of these, failed runs")),
         "together_of": ((), int(run.sum()), about("samples that have run, failed ones too")),
         **{
-            f"together_probability_{word}": (
-                (), end, about(f"{word} bound of the probability to keep to all requirements"),
-            )
+            f"together_probability_{word}": ((), end, about(f"{word} bound of meeting all of them"))
             for word, end in zip(("lower", "upper"), ends, strict=True)
         },
         "together_confidence": ((), sure, about("confidence of each bound")),
@@ -200,6 +198,8 @@ _MEANING = {
 }  # fmt: skip
 
 
+_SLIGHT = 0.05
+"""Chance below which it is told that more samples will hardly show a requirement met."""
 _FINAL = ("deployment_time", "asynchrony_max", "least_latch_rate", "peak_latch_rate")
 """Outputs that do not change any more once every V-joint has come to 180 deg."""
 
@@ -383,10 +383,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         bad, used = one["samples_violating"], one["samples_used"]
         if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
             one["probability"], chosen = np.nan, True
-            near = one["samples_close"]
-            but = (f"; {near}, on either side of the limit, are closer to it than the numerical "
-                   "error") * bool(near)  # fmt: skip
-            notes.append(f"{name}: {bad} of {used} samples violate it{but}")
+            k = one["samples_close"]
+            but = f"; {k}, on either side of the limit, are closer to it than the numerical error"
+            notes.append(f"{name}: {bad} of {used} samples violate it{but * bool(k)}")
         rows.append((
             one["requirement_text"], verdict_text(one), f"{one['probability_required']:g}",
             f"{one['confidence_required']:g}", number_text(one["probability"]),
@@ -396,9 +395,11 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         ))  # fmt: skip
         if further > 0:
             more = counted(further, "further sample")
-            taken = counted(one["samples_lost"], "failed run")
-            kept = f" (if the {taken} are counted as violations)" * bool(one["samples_lost"])
+            gone = counted(one["samples_lost"], "failed run")
+            kept = f" (if the {gone} are counted as violations)" * bool(one["samples_lost"])
             so_far = f"{bad} of {used} violate it so far; " * bool(bad)
+            odds = (1.0 - bad / max(used, 1)) ** further
+            kept += f", which has a chance of {odds:.1g} at such a share" * (odds < _SLIGHT)
             notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
         if bad and verdict != Verdict.NO_POPULATION:
             low = bound_text(1.0 - one["probability_upper"], upper=False)

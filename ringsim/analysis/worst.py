@@ -221,11 +221,12 @@ def _odd(variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
         apart = np.abs(rows[sample] - np.median(rows))
         if apart.max() <= ROUND_OFF * np.abs(rows).max():
             continue
-        below = np.array([np.mean(rows < value) for value in rows[sample]])
-        above = np.array([np.mean(rows > value) for value in rows[sample]])
+        # With those that have the same: of a few discrete values many samples have the farthest.
+        others = np.delete(rows, sample, axis=0)
+        below = np.array([np.sum(others <= value) for value in rows[sample]])
+        above = np.array([np.sum(others >= value) for value in rows[sample]])
         k = int(np.minimum(below, above).argmin())
-        # Of continuous values one of so many is the farthest, and has none beyond it.
-        share = rows.shape[1] * (min(below[k], above[k]) + 1.0 / rows.size)
+        share = (min(below[k], above[k]) + 1.0) / len(rows)
         if share <= RARE:
             told = _told(of[k], rows, float(rows[sample, k]), _units(variable))
             odd.append(_Oddity(share, told))

@@ -20,7 +20,7 @@ from ringsim.outputs.family import (
 )
 from ringsim.scene import Scene
 from ringsim.stepping.instant import exchanged
-from ringsim.tables import known_to, readable, unit_text, without_power
+from ringsim.tables import known_to, number_text, readable, unit_text, without_power
 from ringsim.variables import TIMINGS, Cause, Fate, Outcome, Status
 
 # Energies over time, and what their balance lacks.
@@ -136,7 +136,9 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
                 found[variable.name] = f"{'0':>{len(text)}} {unit_text(unit)}".rstrip()
                 continue
             text = without_power(text, number).strip().rjust(len(text))
-            text = known_to(text, bar, exact=number).strip().rjust(len(text))
+            if bar > 0.0:  # all digits that its error leaves it, and none behind them
+                known = known_to(number_text(number, _MOST_DIGITS), bar, exact=number)
+                text = known.rjust(len(text))
             text = f"{text} {unit_text(unit)}".rstrip()
             if np.isfinite(bar):  # samples of a campaign need not have one
                 text += f" +- {bar:.2g}"
@@ -148,6 +150,10 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
                 text += "; more than that after the last lock"
             found[variable.name] = text
     return found
+
+
+_MOST_DIGITS = 6
+"""Of a number with an error bar, however small that is."""
 
 
 def exceeded(peak: float, later: float) -> bool:

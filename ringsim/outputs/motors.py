@@ -81,25 +81,25 @@ class Motors(Output):
         ),
         Variable(
             "motor_lag_duration", ("plane", "winch"), "s",
-            "time that a motor was slower than commanded by more than 1 %, for want of torque; NaN "
-            "of motors without a command",
+            "time in all that a motor was slower than commanded by more than 1 %, for want of "
+            "torque; NaN of motors without a command",
         ),
         Variable(
             "longest_motor_lag", (), "s",
-            "longest time that any motor was slower than commanded",
-            error_bar=ErrorBar("longest lag of a motor", safety=2.0, of="motor_lag_duration"),
-            summary=("longest lag of a motor", "10.3g"), worse="larger",
+            "time in all that one motor was slower than commanded, of that with most of it",
+            error_bar=ErrorBar("total lag of a motor", safety=2.0, of="motor_lag_duration"),
+            summary=("total lag of a motor", "10.3g"), worse="larger",
             largest_of="motor_lag_duration",
         ),
         Variable(
             "total_motor_energy", (), "J", "energy that the shafts of all motors gave by the end",
-            error_bar=ErrorBar("energy of all motors", safety=1.8, of="motor_energy"),
+            error_bar=ErrorBar("energy of all motors", safety=1.5, of="motor_energy"),
             summary=("energy of all motors", "10.3g"), worse="larger",
         ),
         *electrical,
         Variable(
             "peak_motor_current", (), "A", "largest current of any motor at any step",
-            error_bar=ErrorBar("largest current of a motor", safety=2.7, of="motor_current"),
+            error_bar=ErrorBar("largest current of a motor", safety=1.5, of="motor_current"),
             needs=_CONSTANTS, summary=("largest motor current", "10.3g"), worse="larger",
             largest_of="motor_current",
         ),
@@ -107,7 +107,7 @@ class Motors(Output):
             "total_motor_electrical_energy", (), "J",
             "electrical energy that all motors took by the end", needs=_CONSTANTS, worse="larger",
             error_bar=ErrorBar(
-                "electrical energy of all motors", safety=1.5, of="motor_electrical_energy"
+                "electrical energy of all motors", safety=2.0, of="motor_electrical_energy"
             ),
         ),
         *(variable for peak in peaks[:2] for variable in peak.variables),
@@ -130,7 +130,7 @@ class Motors(Output):
         times, winches = series.times, len(run.coordinates["winch"])
         found = np.full((4, len(times), len(run.locks), winches), np.nan)
         torque, shaft, power, energy = found
-        current, supplied, lost, lagged, climbed = np.full((5, *torque.shape), np.nan)
+        current, supplied, lost, lagged, climbed, begun = np.full((6, *torque.shape), np.nan)
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
             tension, speed, wound, told = series.values[:, plane, end].T
@@ -154,6 +154,13 @@ class Motors(Output):
             # Also of a step at whose end the winch is switched off: its drum turned until then.
             turned = (wound[steps] - wound[before]) / motor.travel
             energy[place] = 0.5 * (given[steps] + given[before]) * turned
+            # What a rotor takes that runs up is known without the course of its torque, which steps
+            # may hardly resolve: the load of the rope, and its kinetic energy.
+            load = motor.loads(tension)[1]
+            gains = 0.5 * (motor.rotor_inertia or 0.0) * np.diff((speed / motor.travel) ** 2)
+            runs_up = np.append(False, up)[steps]
+            taken = 0.5 * (load[steps] + load[before]) * turned + np.append(0.0, gains)[steps]
+            energy[place] = np.where(runs_up, taken, energy[place])
             during = times[steps] - times[before]
             if motor.speed is not None:
                 command = motor.commanded(times - winch.start_time)[0]
@@ -166,9 +173,11 @@ class Motors(Output):
                 lagged[place] = 0.5 * during * runs[before] * (1.0 * since + until)
             if motor.torque_constant is not None:
                 takes = motor.electrical_power(given, speed / motor.travel)
-                current[place] = np.where(
-                    on, motor.current(given, speed / motor.travel)[steps], 0.0
-                )
+                flows = motor.current(given, speed / motor.travel)
+                current[place] = np.where(on, flows[steps], 0.0)
+                # Just after the start, with nearly all torque and the losses of what turns.
+                first = motor.current(motor.available(low), high)
+                begun[place] = np.append(0.0, np.where(up, first, 0.0))[steps]
                 supplied[place] = np.where(on, takes[steps], 0.0)
                 loss = takes - given * speed / motor.travel
                 half = np.where(runs, 0.5, 0.0)[before] * during
@@ -189,7 +198,7 @@ class Motors(Output):
             max((float(one.largest_power(0.0, one.free_speed)) for one in each), default=math.inf),
             math.inf,
         )
-        largest = torque, np.fmax(power, climbed), current
+        largest = torque, np.fmax(power, climbed), np.fmax(current, begun)
         for peak, own, bound in zip(self.peaks, largest, bounds, strict=True):
             if np.isfinite(own).any():  # no current of motors that do not tell their constant
                 most, places = peak.of(run, times, own)

@@ -266,6 +266,25 @@ def test_bars_cover_what_a_finer_run_finds() -> None:
         assert error < barred[f"{name}_error"] < 0.05 * truth[name]
 
 
+def test_bars_of_motors_cover_what_finer_steps_find() -> None:
+    winding = {"torque_constant": 0.02, "no_load_current": 0.01}
+    values = {
+        f"cables.{plane}.winch.winding.{key}": value
+        for plane in ("upper", "lower") for key, value in winding.items()
+    }  # fmt: skip
+    values |= {"structure.sections": 5, "margin": "none", "solver.tolerance": 3e-3}
+    scene = load_scene("ring18-motor").with_values(values)
+    found = run_frame(scene.with_values({"solver.error_bars": True})).values
+    finer = {"solver.tolerance": 5e-5, "solver.step": 0.02, "rods.elements": 4}
+    truth = run_frame(scene.with_values(finer)).values
+    names = [f"peak_motor_{each}" for each in ("torque", "power", "current")]
+    names += ["longest_motor_lag", "total_motor_energy", "total_motor_electrical_energy"]
+    for name in names:
+        bar = float(found[f"{name}_error"])
+        assert 0.0 < bar < 0.2 * float(found[name]), name
+        assert abs(float(found[name]) - float(truth[name])) <= bar, name
+
+
 def test_bars_of_what_locks_do_cover_what_finer_steps_find() -> None:
     fields = {
         "structure.sections": 4, "boom.base": "fixed", "record.reactions": True,

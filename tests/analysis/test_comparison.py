@@ -145,6 +145,17 @@ def test_outputs_that_are_the_same_in_all_samples_are_one_row():
     assert not any(told in line for line in lines)
 
 
+def test_what_is_constant_in_campaigns_that_are_not_paired_is_one_row():
+    counts = {"locked_joints": ("sample", np.full(COUNT, 24))}
+    one, other = (seeded(VALUES, seed=k).assign(counts) for k in (0, 1))
+    lines = compared(compare(one, other))
+    assert not any(line.startswith("locked_joints ") for line in lines)
+    assert "the same in all samples of both: locked_joints 24" in lines
+    other["locked_joints"][3] = 23
+    lines = compared(compare(one, other))
+    assert any(line.startswith("locked_joints ") for line in lines)
+
+
 def test_settings_of_the_solver_are_no_inputs_that_differ():
     bars = np.arange(COUNT) % 2.0
     first, second = seeded(VALUES), seeded(SHIFTED)

@@ -109,6 +109,15 @@ def test_further_samples_would_show_only_what_lost_ones_leave_open():
         f"asynchrony_max: {samples_needed(10, 0.99, 0.9) - 100} further samples without a "
         "violation would prove it (if the 10 failed runs are counted as violations)"
     ) in text_of(analyse(made, MOST_TEN))
+    assert "chance of" not in text_of(analyse(made, MOST_TEN))
+    few = {"asynchrony_max": {"max": 10.0, "probability": 0.6, "confidence": 0.9}}
+    violating = np.where(np.arange(20) < 8, 11.0, 9.0)
+    found = analyse(campaign(violating), few)
+    more = found.further_samples.item()
+    assert (
+        f"asynchrony_max: 8 of 20 violate it so far; {more} further samples without a violation "
+        f"would prove it, which has a chance of {0.6**more:.1g} at such a share"
+    ) in text_of(found)
     status[:] = Status.TIMEOUT
     found = analyse(made.assign(status=("sample", status)), MOST_TEN)
     assert found.further_samples.item() == -1

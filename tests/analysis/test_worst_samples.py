@@ -88,7 +88,7 @@ def inputs(**columns: np.ndarray) -> xr.Dataset:
 
 def test_what_is_far_out_is_told_in_words() -> None:
     even = np.linspace(-1.0, 1.0, 20)
-    places = 1e-3 * (1.0 + 0.01 * np.outer(even, [1.0, -1.0, 1.0, -1.0]))
+    places = 1e-3 * (1.0 + 0.01 * np.outer(even, [1.0, -0.9, 1.0, -0.9]))
     places[9, 3] = 1.5e-3
     one = inputs(
         temperature=293.15 + 50.0 * even, friction=places, word=np.array(["a"] * 19 + ["b"]),
@@ -104,6 +104,17 @@ def test_what_is_far_out_is_told_in_words() -> None:
     assert odd == "section 4 of friction 0.0015 m (+50 %, the highest)"
     assert "word = b (as in 1 of 20)" in word
     assert "temperature 343.1 K (70 C, the highest)" in word
+
+
+def test_a_value_that_many_samples_have_is_not_unusual() -> None:
+    """Of a discrete input none lies beyond the last value, and a quarter may have it."""
+    for count, rare in ((5, False), (2, True)):  # of 40, on each side: two are one in twenty
+        steps = np.repeat([1.2, 1.5, 1.8], [count, 40 - 2 * count, count])
+        one = inputs()
+        one = one.isel(sample=0, drop=True).assign_coords(sample=np.arange(40))
+        one["step"] = "sample", steps, {"role": "input", "path": "a.step", "units": "m"}
+        ends = unusual(one, [0, 39])
+        assert [each != "nothing unusual" for each in ends] == [rare, rare]
 
 
 def test_chance_makes_one_sample_in_ten_unusual() -> None:
