@@ -6,7 +6,7 @@ import re
 import tomllib
 from typing import TYPE_CHECKING, Any
 
-from ringsim.cable.records import number_of, path_of
+from ringsim.cable.records import CABLES, number_of, path_of, spans_of
 from ringsim.choice import kinds_of
 from ringsim.refusal import DEEPEST, InputError, shorten
 from ringsim.structures.family import Structure
@@ -181,6 +181,24 @@ def points_in(scene: "Scene | dict[str, Any]") -> tuple[str, ...]:
         sections = structure.sections if own is None else own.default
     usable = type(sections) is int and 0 < sections <= MOST_SECTIONS
     return tuple(structure.cable_points(sections)) if usable else ()
+
+
+def with_names(table: dict[str, Any]) -> dict[str, Any]:
+    """A scene's table in which faults name cables, pulleys and spans, as files may; what cannot be
+    named keeps its number.
+    """
+    points, cables = points_in(table), table.get("cables") or {}
+    present = [name for name in CABLES if isinstance(cables.get(name), dict)]
+    faults = [dict(fault) for fault in table.get("faults", ())]
+    for fault in faults if points else ():
+        number = fault.get("cable")
+        if isinstance(number, int) and 0 < number <= len(present):
+            fault["cable"] = present[number - 1]
+            path = path_of(points, cables[fault["cable"]].get("end", "first"))
+            for key, names in (("pulley", path[1:-1]), ("span", spans_of(path))):
+                if isinstance(k := fault.get(key), int) and 0 < k <= len(names):
+                    fault[key] = names[k - 1]
+    return table | ({"faults": faults} if faults else {})
 
 
 def pulleys_at(scene: "Scene | dict[str, Any]", path: str) -> tuple[str, ...]:

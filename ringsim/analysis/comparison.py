@@ -51,7 +51,7 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.verdicts import Verdict, judge, verdict_about, verdict_text
 from ringsim.analysis.worst import margins_of
 from ringsim.outputs.base import may_be_off
-from ringsim.overrides import flat
+from ringsim.overrides import flat, with_names
 from ringsim.refusal import InputError, show
 from ringsim.sampling.distributions import law_text
 from ringsim.tables import where_apart
@@ -234,6 +234,7 @@ def _independent(first: Any, second: Any, replicates: list[Any]) -> intervals.In
 
 
 SIDES = ("first", "second")
+_LONGEST = 200  # letters of a setting: of several faults, too
 
 
 @dataclass(frozen=True)
@@ -375,7 +376,8 @@ def settings(both: Both) -> dict[str, Any]:
     Fidelities are among them, and before them the distributions and requirements of campaigns.
     A value that one of them lacks is "none".  No values if a file does not hold its scene.
     """
-    scenes = [flat(tomllib.loads(str(each.attrs.get("scene", "")))) for each in both]
+    tables = [tomllib.loads(str(each.attrs.get("scene", ""))) for each in both]
+    scenes = [flat(with_names(table)) for table in tables]
     if all(scenes):
         engines = [{"fidelity": str(each.attrs.get("fidelity", ""))} for each in both]
         scenes = [engine | scene for engine, scene in zip(engines, scenes, strict=True)]
@@ -398,7 +400,7 @@ def settings(both: Both) -> dict[str, Any]:
     words = [where_apart(*(each.get(name, "none") for each in known)) for name in other]
     for k, (side, scene) in enumerate(zip(SIDES, scenes, strict=True)):
         told = [each[k] for each in words]
-        told += [show(scene[path]) if path in scene else "none" for path in apart]
+        told += [show(scene[path], _LONGEST) if path in scene else "none" for path in apart]
         about_it = {"long_name": f"value in the {side}"}
         found[f"setting_{side}"] = "setting", np.array(told, dtype=object), about_it
     return found

@@ -19,7 +19,7 @@ from ringsim.files import require_place, write_text
 from ringsim.layout.layout import Layout, internal_mobility, layout_of
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
-from ringsim.overrides import flat, place_of
+from ringsim.overrides import flat, place_of, with_names
 from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.reference import WORDS, word
@@ -182,7 +182,7 @@ def _summary(scene: Scene) -> dict[str, str]:
             for label, text in _described(name, part.model_dump()).items()
         },
         "winches": _stalls(scene),
-        "faults": "; ".join(map(_fields, scene.faults)),
+        "faults": "; ".join(map(_listed, with_names(scene.to_table()).get("faults", ()))),
         "friction": ", ".join(friction),
         "left out": ", ".join(name for name, out in absent.items() if out).replace("_", " ")
         or "nothing",

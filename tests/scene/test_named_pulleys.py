@@ -11,7 +11,7 @@ from ringsim.cable.records import BlockSheave
 from ringsim.cli import cli
 from ringsim.layout.bodies import pose_of
 from ringsim.layout.layout import layout_of
-from ringsim.overrides import field_at
+from ringsim.overrides import field_at, with_names
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene, scene_from_toml
 
@@ -142,6 +142,35 @@ def test_unknown_names_are_refused(values, words) -> None:
         TRUSS.with_values(values)
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@for_each("end", ["first", "last", "both"])
+def test_faults_are_told_by_the_names_that_files_give_them(end) -> None:
+    whole = TRUSS.with_values({"cables.lower.end": end})
+    faults = [
+        {"kind": "cut-cable", "cable": "lower", "span": whole.span_names["lower"][3]},
+        {"kind": "jammed-pulley", "cable": "upper", "pulley": "section 1 V"},
+        {"kind": "off-sheave", "cable": "lower", "pulley": "section 1 first hinge"},
+        {"kind": "stuck-vjoint", "plane": "lower", "section": 2},
+    ]  # fmt: skip
+    given = [{"time": 1.0, **fault} for fault in faults]
+    scene = whole.with_values({"faults": given})
+    table = scene.to_table()
+    told = with_names(table)["faults"]
+    for fault, words in zip(faults, told, strict=True):
+        assert {key: words[key] for key in fault} == fault
+    assert whole.with_values({"faults": told}) == scene
+    for key, value in (("cable", 3), ("pulley", 99)):
+        unknown = table["faults"][1] | {key: value}
+        assert with_names(table | {"faults": [unknown]})["faults"][0][key] == value
+    assert with_names({}) == {}
+
+
+def test_a_key_of_another_fault_is_refused_with_the_keys_that_there_are() -> None:
+    """A plane is that of a joint: of a rope its cable, which is the upper one if nobody says so."""
+    wanted = r'leave it out.*; "jammed-pulley" has time, cable, pulley\)'
+    with pytest.raises(InputError, match=wanted):
+        with_fault(kind="jammed-pulley", plane="lower", pulley=2)
 
 
 def test_explain_tells_the_names() -> None:
