@@ -150,7 +150,7 @@ def test_faults_are_told_by_the_names_that_files_give_them(end) -> None:
     faults = [
         {"kind": "cut-cable", "cable": "lower", "span": whole.span_names["lower"][3]},
         {"kind": "jammed-pulley", "cable": "upper", "pulley": "section 1 V"},
-        {"kind": "off-sheave", "cable": "lower", "pulley": "section 1 first hinge"},
+        {"kind": "off-sheave", "cable": "lower", "pulley": "section 2 V"},
         {"kind": "stuck-vjoint", "plane": "lower", "section": 2},
     ]  # fmt: skip
     given = [{"time": 1.0, **fault} for fault in faults]
