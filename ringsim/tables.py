@@ -177,8 +177,8 @@ def interval_text(low: float, high: float, digits: int = 4) -> str:
 
     >>> interval_text(6.4463, 6.7259), interval_text(1.0, math.inf), interval_text(0.6511, 0.8976)
     ('6.45 .. 6.73', '1 .. -', '0.65 .. 0.90')
-    >>> interval_text(-0.0028, -0.00004)
-    '-0.0028 .. 0.0000'
+    >>> interval_text(-0.0028, -0.00004), interval_text(0.90708, 1.03187, 3)
+    ('-0.0028 .. 0.0000', '0.907 .. 1.032')
     """
     if not (math.isfinite(low) or math.isfinite(high)):
         return "-"
@@ -187,7 +187,7 @@ def interval_text(low: float, high: float, digits: int = 4) -> str:
     if all(re.fullmatch(r"-?\d+(\.\d+)?", end) for end in ends):
         # Zeros that .g drops say as much as other digits: 45.63 .. 46.30.
         longest = max(len(end.partition(".")[2]) for end in ends)
-        ends = [f"{Decimal(end):.{longest}f}" for end in ends]
+        ends = [f"{Decimal(repr(end)):.{longest}f}" for end in (float(low), float(high))]
     ends = [end.removeprefix("-") if re.fullmatch(r"-0\.?0*", end) else end for end in ends]
     return " .. ".join(ends)
 

@@ -40,7 +40,6 @@ from ringsim.analysis.intervals import (
     quantities,
 )
 from ringsim.analysis.requirements import (
-    COUNTS,
     OUTCOME,
     badness_of,
     require_values,
@@ -233,7 +232,7 @@ def _independent(first: Any, second: Any, replicates: list[Any]) -> intervals.In
 # Pairs, and what is told of all outputs.
 
 
-SIDES = ("first", "second")
+SIDES, PLACE = ("first", "second"), ("plane", "section")
 _LONGEST = 200  # letters of a setting: of several faults, too
 
 
@@ -294,6 +293,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             "first_ran": ran[0], "second_ran": ran[1],
             "first_planned": population_of(planned[0]).sizes["sample"],
             "second_planned": population_of(planned[1]).sizes["sample"],
+            "joints": [int(np.prod([a.sizes.get(k, 0) for k in PLACE])) for a in (first, second)],
             "intervals": next(
                 (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
             ),
@@ -302,13 +302,11 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
         },
     )  # fmt: skip
     wanted, twins = [required_by(each.attrs) for each in (first, second)], Twins()
-    joints = {each.sizes.get("plane", 0) * each.sizes.get("section", 0) for each in (first, second)}
     for name in quantities():
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
             if f"{name}_difference" in found:
-                alike = name not in COUNTS or len(joints) == 1  # all of fewer joints are not fewer
-                found[f"{name}_difference"].attrs[BADNESS] = alike * badness_of(name, *wanted)
+                found[f"{name}_difference"].attrs[BADNESS] = badness_of(name, *wanted)
                 twin = twins.of(
                     name, np.concatenate([numbers(each, name)[good(each)] for each in (one, other)])
                 )
@@ -488,11 +486,11 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
         if found[0].size:
             return Pairs(*found, "samples are paired by their inputs")
     none = np.zeros(0, dtype=np.int64)
+    unlike = "seeds" if designs[0] == designs[1] else "designs"
     return Pairs(
         none, none,
-        "samples are not paired, because neither their seeds nor their inputs are equal; pairs "
-        "show smaller differences: give both campaigns the same seed, design and number of "
-        "samples",
+        f"samples are not paired, because neither their {unlike} nor their inputs are equal; pairs "
+        "show smaller differences: give both campaigns the same seed, design and number of samples",
     )  # fmt: skip
 
 

@@ -8,9 +8,10 @@ import xarray as xr
 from ringsim.analysis import derived
 from ringsim.analysis.campaign_notes import NOTE, marked
 from ringsim.analysis.comparison import BADNESS
-from ringsim.analysis.design import REACHED
+from ringsim.analysis.design import LOST, NOT_RUN, REACHED, UNKNOWN
 from ringsim.analysis.indices import largest_by_chance
-from ringsim.analysis.intervals import NOTHING, TWIN, all_alike, is_moment, quantities
+from ringsim.analysis.intervals import NOTHING, ROUND_OFF, TWIN, all_alike, is_moment, quantities
+from ringsim.analysis.requirements import COUNTS
 from ringsim.analysis.study_text import Section
 from ringsim.outputs.base import DOUBT
 from ringsim.tables import (
@@ -387,7 +388,8 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
         if twin := found[f"{name}_difference"].attrs.get(TWIN):
             again.append(f"{name} is {twin}")
             continue
-        if not found.attrs["pairs"] and low == high == 0.0 and first == second:
+        rounded = ROUND_OFF * max(abs(first), abs(second))
+        if not found.attrs["pairs"] and np.abs([apart, low, high]).max() <= rounded:
             alike.append(f"{name} {number_text(first)} {unit_text(unit)}".rstrip())
             continue
         fine = digits_of(min(first, second), max(first, second))
@@ -425,15 +427,21 @@ def _unlike_ends(found: xr.Dataset) -> list[str]:
     """That numbers of rings that did not open stand beside those of rings that did."""
     if "kind" not in found.dims:
         return []
-    shares = found["kind_samples"] / found["kind_samples"].sum("kind")
-    came = shares.sel(kind=[k for k in found["kind"].values.tolist() if k in REACHED]).sum("kind")
-    if came[0] == came[1]:
+    ran = found["kind_samples"].sel(kind=[
+        kind for kind in found["kind"].values.tolist()
+        if not kind.startswith(LOST) and kind not in (UNKNOWN, NOT_RUN)
+    ])  # fmt: skip
+    goals = [kind for kind in ran["kind"].values.tolist() if kind in REACHED]
+    came = (ran.sel(kind=goals).sum("kind") / ran.sum("kind")).values
+    if not np.isfinite(came).all() or came[0] == came[1]:
         return []
-    fewer = names_of(found)[int(came.values.argmin())]
-    ended = f"in {fewer} more samples ended before they were deployed: their", "they"
+    fewer = names_of(found)[int(came.argmin())]
     if found.attrs["runs"]:
-        ended = f"{fewer} ended before it was deployed: its", "it"
-    return [f"{ended[0]} numbers tell how far {ended[1]} came, and lower ones need not be better"]
+        return [f"{fewer} ended before its goal: its numbers tell only how far it came"]
+    return [
+        f"of {fewer} a larger share of the samples ended before their goal: the numbers of these "
+        "tell only how far they came"
+    ]
 
 
 def _is_place(name: str) -> bool:
@@ -474,6 +482,11 @@ def _worse(found: xr.Dataset, name: str) -> str:
     return second if ends[0] > 0.0 else first if ends[1] < 0.0 else "-"
 
 
+def below_a_thousandth(found: xr.Dataset) -> list[str]:
+    """Outputs that a note below the table has instead of a row."""
+    return _outputs(found)[1]
+
+
 def differing(found: xr.Dataset) -> Iterator[str]:
     """The outputs that are not the same in both, those first that an engineer fears to be worse."""
     table, flat = _outputs(found)
@@ -483,4 +496,10 @@ def differing(found: xr.Dataset) -> Iterator[str]:
 
 
 def _badness(found: xr.Dataset, name: str) -> int:
+    joints = np.array(found.attrs["joints"], dtype=float)
+    if name in COUNTS and joints.all() and joints[0] != joints[1]:
+        # All of fewer V-joints are not fewer: by the share of them that is missing.
+        lacks = 1.0 - found[f"{name}_mean"].values / joints
+        apart = lacks[1] - lacks[0] if abs(lacks[1] - lacks[0]) > ROUND_OFF else 0.0
+        return int(np.sign(apart) * np.sign(found[f"{name}_difference"].item()))
     return int(found[f"{name}_difference"].attrs.get(BADNESS, quantities()[name].badness))

@@ -188,8 +188,9 @@ def verdict(campaign: xr.Dataset, found: list[Difference]) -> list[str]:
     if beyond:
         lines = [f"the engines differ by more than their error bars in {', '.join(beyond)}"]
     elif stated:
-        told = [bool(np.isfinite(each.bars).any()) for each in found if each.listed]
-        which = "" if all(told) else f" in the {counted(sum(told), 'output')} with such bars"
+        barred = {each.name for each in found if np.isfinite(each.bars).any()}
+        every = all(each.name in barred for each in found if each.listed)
+        which = "" if every else f" in the {counted(len(barred), 'output')} with such bars"
         lines = [f"the engines differ by no more than their error bars{which}"]
     return lines + too_far(campaign, found)
 

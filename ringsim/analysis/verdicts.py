@@ -398,7 +398,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             gone = counted(one["samples_lost"], "failed run")
             kept = f" (if the {gone} are counted as violations)" * bool(one["samples_lost"])
             so_far = f"{bad} of {used} violate it so far; " * bool(bad)
-            odds = (1.0 - bad / max(used, 1)) ** further
+            odds = max((1.0 - bad / max(used, 1)) ** further, 1e-6) if not kept else 1.0
             kept += f", which has a chance of {odds:.1g} at such a share" * (odds < _SLIGHT)
             notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
         if bad and verdict != Verdict.NO_POPULATION:

@@ -90,7 +90,7 @@ def unusual(
         return [other_than_base(campaign, place) for place in places]
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
-    listed = placement(campaign).kind == "list"
+    listed, grid = (placement(campaign).kind == kind for kind in ("list", "grid"))
     labels, usual = (_labels(campaign), _usual(campaign)) if listed else ([], [])
     for place, sides in zip(places, separating or [{}] * len(places), strict=True):
         told, named = [str(each.values[place]) for each in labels], set[str]()
@@ -126,8 +126,20 @@ def unusual(
                 words = _told(name, values, float(values[place]), _units(both[name][0]))
                 odd.append(_Oddity(share, words))
         told += [each.words for each in sorted(odd, key=lambda each: (not each.before, each.share))]
+        told = told or (_chosen(campaign, place) if grid else [])
         found.append("; ".join(told[:_MOST]) or "nothing unusual")
     return found
+
+
+def _chosen(campaign: xr.Dataset, place: int) -> list[str]:
+    """Of a grid, in which no value is rare, those of a sample that are at the end of theirs."""
+    told = []
+    for variable in (campaign[name] for name in inputs(campaign)):
+        for of, column in () if _has_words(variable) else _columns(variable):
+            if column[place] in (column.min(), column.max()) and np.ptp(column):
+                name = f"{of}{called(variable)}"
+                told.append(_told(name, column, float(column[place]), _units(variable)))
+    return told
 
 
 def _labels(campaign: xr.Dataset) -> list[xr.DataArray]:
@@ -218,13 +230,15 @@ def _odd(variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
         ]
     ):
         rows = each.reshape(len(each), -1)
-        apart = np.abs(rows[sample] - np.median(rows))
-        if apart.max() <= ROUND_OFF * np.abs(rows).max():
+        if not (known := np.isfinite(rows)).any() or not known[sample].any():
+            continue
+        apart = np.abs(rows[sample] - np.median(rows[known]))
+        if np.nanmax(apart) <= ROUND_OFF * np.abs(rows[known]).max():
             continue
         # With those that have the same: of a few discrete values many samples have the farthest.
-        others = np.delete(rows, sample, axis=0)
-        below = np.array([np.sum(others <= value) for value in rows[sample]])
-        above = np.array([np.sum(others >= value) for value in rows[sample]])
+        others, near = np.delete(rows, sample, axis=0), ROUND_OFF * np.nanmax(np.abs(rows))
+        below = np.array([np.sum(~(others > value + near)) for value in rows[sample]])
+        above = np.array([np.sum(~(others < value - near)) for value in rows[sample]])
         k = int(np.minimum(below, above).argmin())
         share = (min(below[k], above[k]) + 1.0) / len(rows)
         if share <= RARE:
@@ -236,7 +250,7 @@ def _odd(variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
 
 def _told(name: str, rows: Array, value: float, units: str) -> str:
     """A value among those of all samples."""
-    middle = float(np.median(rows))
+    middle = float(np.nanmedian(rows))
     end = {rows.min(): ", the lowest", rows.max(): ", the highest"}.get(value, "")
     if units == "K" and not name.startswith(DIFFERENCE):
         colder = float(np.mean(rows < value))
@@ -438,6 +452,8 @@ COLUMNS = ("failure", "failed", "of", "sample", "found", "inputs")
 
 def note_on_unusual(analysis: xr.Dataset) -> str:
     """What "unusual inputs" are; empty where samples differ from a base case by one change each."""
+    if analysis.attrs.get("design") == "grid":
+        return f"{_NOTE_ON_UNUSUAL}; where none is, those at the ends of the grid"
     return "" if "case" in analysis.dims else _NOTE_ON_UNUSUAL
 
 

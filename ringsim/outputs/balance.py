@@ -1,5 +1,6 @@
 """Energies over a run, how it ended, and its error bars."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -20,7 +21,7 @@ from ringsim.outputs.family import (
 )
 from ringsim.scene import Scene
 from ringsim.stepping.instant import exchanged
-from ringsim.tables import known_to, number_text, readable, unit_text, without_power
+from ringsim.tables import known_to, readable, unit_text, without_power
 from ringsim.variables import TIMINGS, Cause, Fate, Outcome, Status
 
 # Energies over time, and what their balance lacks.
@@ -136,9 +137,10 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
                 found[variable.name] = f"{'0':>{len(text)}} {unit_text(unit)}".rstrip()
                 continue
             text = without_power(text, number).strip().rjust(len(text))
-            if bar > 0.0:  # all digits that its error leaves it, and none behind them
-                known = known_to(number_text(number, _MOST_DIGITS), bar, exact=number)
-                text = known.rjust(len(text))
+            if 0.0 < bar < math.inf:  # all digits that its error leaves it, and none behind them
+                whole = math.floor(math.log10(abs(number))) + 1 if number else 1
+                known = f"{number:#.{max(_MOST_DIGITS, whole)}g}".removesuffix(".")
+                text = known_to(known, bar, exact=number).rjust(len(text))
             text = f"{text} {unit_text(unit)}".rstrip()
             if np.isfinite(bar):  # samples of a campaign need not have one
                 text += f" +- {bar:.2g}"
@@ -153,7 +155,7 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
 
 
 _MOST_DIGITS = 6
-"""Of a number with an error bar, however small that is."""
+"""At most, before the point or behind it, of a number with an error bar."""
 
 
 def exceeded(peak: float, later: float) -> bool:

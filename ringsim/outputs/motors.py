@@ -134,15 +134,28 @@ class Motors(Output):
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
             tension, speed, wound, told = series.values[:, plane, end].T
+            ending = motor
             if np.any(told != motor.commanded_speed()):  # by a controller
-                motor = motor.model_copy(update={"speed": told / motor.travel, "ramp": None})
+                # A step ends with the command with which it began.
+                ending, motor = (
+                    motor.model_copy(update={"speed": each / motor.travel, "ramp": None})
+                    for each in (np.append(told[:1], told[:-1]), told)
+                )
             runs = np.array([winch.turns(time + AT_ONCE) for time in times], dtype=bool)
             if winch.after_lock == "stop":
                 runs &= times <= np.nan_to_num(held[plane].max(), nan=math.inf)
-            on, given = runs[steps], motor.torque(tension, speed, times - winch.start_time)
+            on, since_start = runs[steps], times - winch.start_time
+            # What is told to go slower, or is switched off, has been braked where its step ends:
+            # before that it turned as fast as its rope tells.
+            braked = np.append(False, (np.diff(told) < 0.0) | (runs[:-1] & ~runs[1:]))
+            rate = np.diff(wound, prepend=0.0) / np.diff(times, prepend=-1.0)
+            last, most = np.append(0.0, speed[:-1]), motor.travel * ending.fastest
+            ended = np.where(braked, np.clip(2.0 * rate - last, rate, np.fmax(rate, most)), speed)
+            given = motor.torque(tension, speed, since_start)
+            reached = ending.torque(tension, ended, since_start)
             # A rotor that is switched on stands, and has its largest torque: no step ends there.
-            low, high = (np.maximum(each, 0.0) / motor.travel for each in (speed[:-1], speed[1:]))
-            up = runs[:-1] & motor.runs_up(speed, times - winch.start_time)[:-1] & (high > low)
+            low, high = (np.maximum(each, 0.0) / motor.travel for each in (speed[:-1], ended[1:]))
+            up = runs[:-1] & motor.runs_up(speed, since_start)[:-1] & (high > low)
             starts = np.flatnonzero(up & (low == 0.0))
             given[starts] = motor.available(0.0)
             found[:, :, plane, end] = np.nan_to_num(found[:, :, plane, end])
@@ -153,22 +166,24 @@ class Motors(Output):
             climbed[place] = climbs[steps]
             # Also of a step at whose end the winch is switched off: its drum turned until then.
             turned = (wound[steps] - wound[before]) / motor.travel
-            energy[place] = 0.5 * (given[steps] + given[before]) * turned
+            energy[place] = 0.5 * (reached[steps] + given[before]) * turned
             # What a rotor takes that runs up is known without the course of its torque, which steps
             # may hardly resolve: the load of the rope, and its kinetic energy.
             load = motor.loads(tension)[1]
-            gains = 0.5 * (motor.rotor_inertia or 0.0) * np.diff((speed / motor.travel) ** 2)
+            gains = 0.5 * (motor.rotor_inertia or 0.0) * (high**2 - low**2)
             runs_up = np.append(False, up)[steps]
             taken = 0.5 * (load[steps] + load[before]) * turned + np.append(0.0, gains)[steps]
             energy[place] = np.where(runs_up, taken, energy[place])
             during = times[steps] - times[before]
             if motor.speed is not None:
-                command = motor.commanded(times - winch.start_time)[0]
-                late = runs & (speed / motor.travel < (1.0 - _LAGS) * command)
+                late, slow = (
+                    runs & (has / motor.travel < (1.0 - _LAGS) * one.commanded(since_start)[0])
+                    for one, has in ((motor, speed), (ending, ended))
+                )
                 # Up to the end of a step at which it is switched off it is as at its beginning; a
                 # shaft without inertia that starts is in its first step as at the step's end.
                 first = motor.rotor_inertia is None and times <= winch.start_time + AT_ONCE
-                until = np.where(runs[steps], late[steps], late[before])
+                until = np.where(runs[steps], slow[steps], late[before])
                 since = np.where((runs & first)[before] & runs[steps], until, late[before])
                 lagged[place] = 0.5 * during * runs[before] * (1.0 * since + until)
             if motor.torque_constant is not None:
@@ -177,11 +192,13 @@ class Motors(Output):
                 current[place] = np.where(on, flows[steps], 0.0)
                 # Just after the start, with nearly all torque and the losses of what turns.
                 first = motor.current(motor.available(low), high)
-                begun[place] = np.append(0.0, np.where(up, first, 0.0))[steps]
+                begun[place] = np.append(np.where(up, first, 0.0), 0.0)[steps]
                 supplied[place] = np.where(on, takes[steps], 0.0)
                 loss = takes - given * speed / motor.travel
+                spent = motor.electrical_power(reached, ended / motor.travel)
+                spent -= reached * ended / motor.travel
                 half = np.where(runs, 0.5, 0.0)[before] * during
-                lost[place] = half * (loss[steps] + loss[before])
+                lost[place] = half * (spent[steps] + loss[before])
         power[:] = torque * shaft
         energy[:] = np.cumsum(energy, axis=0)
         values: Values = {
@@ -196,7 +213,7 @@ class Motors(Output):
         bounds = (
             max((one.available(0.0) for one in each), default=math.inf),
             max((float(one.largest_power(0.0, one.free_speed)) for one in each), default=math.inf),
-            math.inf,
+            max((float(one.current(one.available(0.0), 1.0)) for one in each), default=math.inf),
         )
         largest = torque, np.fmax(power, climbed), np.fmax(current, begun)
         for peak, own, bound in zip(self.peaks, largest, bounds, strict=True):
@@ -347,7 +364,7 @@ class DriveMargins(Output):
         names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
         margin, angle, time = (float(values.get(name, math.nan)) for name in names)
         word = "enough" if margin >= 0.0 else "NOT enough"
-        short = margin >= 0.0 and int(values.get("outcome", Fate.NONE)) in AT_REST
+        short = margin >= 0.0 and values.get("outcome", Fate.NONE) in AT_REST
         rigid = short and not left_by_winches(np.asarray(values.get("drive_margin", ())))
         if short:
             word = (

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from ringsim.analysis.comparison import paired, samples_of
-from ringsim.analysis.comparison_text import differing, doubtful, names_of
+from ringsim.analysis.comparison_text import below_a_thousandth, differing, doubtful, names_of
 from ringsim.analysis.courses import blocks, deployed, names_of_ends
 from ringsim.analysis.design import (
     endings,
@@ -86,7 +86,9 @@ def _figures(
         unmoved = [n for n in every if n not in moved]
         required = [n for n in moved if any(limits(each, n) for each in both)]
         names = [*required, *(n for n in moved if n not in required)][:_PANELS]
-        left = [n for n in moved if n not in names]
+        flat = below_a_thousandth(found)
+        left = [n for n in moved if n not in {*names, *flat}]
+        unmoved += [n for n in moved if n in flat and n not in names]
         if names and found.attrs["pairs"]:
             words = "How far the samples of each pair differ"
             yield "differences", words, _noted(pairs(found, both, names), unmoved, left)

@@ -72,12 +72,12 @@ def filling(
     A figure moves up to the first sheet that has room for it.  Of the others' sheets the emptiest
     comes first, since it may find room below text.
     """
-    front = _Sheets(_SHEET[1] - _HEADING)
+    front = _Sheets()
     for each in drawn[:first]:
         front.put(each)
     late = [each for each in drawn[first:] if each[0] in more and front.sheets]
     moved = [each[0] for each in late if front.put(each, anew=False)]
-    rest = _Sheets(_SHEET[1])
+    rest = _Sheets()
     for each in drawn[first:]:
         if each[0] not in moved:
             rest.put(each)
@@ -85,11 +85,11 @@ def filling(
 
 
 class _Sheets:
-    """Sheets, of which the first has less room than all others (inch)."""
+    """Sheets with figures, on each of which a heading has room, too."""
 
-    def __init__(self, first: float) -> None:
+    def __init__(self) -> None:
         self.sheets: list[list[str]] = []
-        self._first, self._sizes = first, dict[str, tuple[float, float]]()
+        self._sizes = dict[str, tuple[float, float]]()
 
     def put(self, drawn: tuple[str, str, "Figure"], *, anew: bool = True) -> bool:
         """Put a figure on the first sheet that has room, or ``anew`` on another; whether it was."""
@@ -97,8 +97,8 @@ class _Sheets:
         wide, high = map(float, figure.get_size_inches())
         caption = _GAP + _LINE * math.ceil(len(words) / _LETTERS)
         self._sizes[name] = min(_SCALE, _SHEET[0] / wide) * high, caption
-        for k, names in enumerate(self.sheets):
-            if self._fit(k, [*names, name]) >= _LEAST_FIT:
+        for names in self.sheets:
+            if self._fit([*names, name]) >= _LEAST_FIT:
                 names.append(name)
                 return True
         self.sheets += [[name]] * anew
@@ -106,16 +106,16 @@ class _Sheets:
 
     def told(self) -> list[Sheet]:
         """All sheets."""
-        return [Sheet(own, min(1.0, self._fit(k, own))) for k, own in enumerate(self.sheets)]
+        return [Sheet(own, min(1.0, self._fit(own))) for own in self.sheets]
 
     def height_of(self, names: Sequence[str]) -> float:
         """Of figures with their captions, inch."""
         return sum(map(sum, (self._sizes[name] for name in names)))
 
-    def _fit(self, sheet: int, names: Sequence[str]) -> float:
+    def _fit(self, names: Sequence[str]) -> float:
         """How far figures must be reduced to fit; captions are not."""
         figures, captions = map(sum, zip(*(self._sizes[name] for name in names), strict=True))
-        return ((_SHEET[1] if sheet else self._first) - captions) / figures
+        return (_SHEET[1] - _HEADING - captions) / figures
 
 
 @functools.cache

@@ -266,8 +266,9 @@ def test_bars_cover_what_a_finer_run_finds() -> None:
         assert error < barred[f"{name}_error"] < 0.05 * truth[name]
 
 
-def test_bars_of_motors_cover_what_finer_steps_find() -> None:
-    winding = {"torque_constant": 0.02, "no_load_current": 0.01}
+@pytest.mark.parametrize("rotor", [{}, {"rotor_inertia": 1e-7}])
+def test_bars_of_motors_cover_what_finer_steps_find(rotor) -> None:
+    winding = rotor | {"torque_constant": 0.02, "no_load_current": 0.01}
     values = {
         f"cables.{plane}.winch.winding.{key}": value
         for plane in ("upper", "lower") for key, value in winding.items()
@@ -281,7 +282,8 @@ def test_bars_of_motors_cover_what_finer_steps_find() -> None:
     names += ["longest_motor_lag", "total_motor_energy", "total_motor_electrical_energy"]
     for name in names:
         bar = float(found[f"{name}_error"])
-        assert 0.0 < bar < 0.2 * float(found[name]), name
+        at_once = rotor and name in ("peak_motor_torque", "peak_motor_current")  # closed forms
+        assert (bar == 0.0) if at_once else 0.0 < bar < 0.2 * float(found[name]), name
         assert abs(float(found[name]) - float(truth[name])) <= bar, name
 
 

@@ -113,8 +113,24 @@ def test_a_value_that_many_samples_have_is_not_unusual() -> None:
         one = inputs()
         one = one.isel(sample=0, drop=True).assign_coords(sample=np.arange(40))
         one["step"] = "sample", steps, {"role": "input", "path": "a.step", "units": "m"}
+        one["step"][1] = 1.2 * (1.0 + 1e-15)  # as computed
         ends = unusual(one, [0, 39])
         assert [each != "nothing unusual" for each in ends] == [rare, rare]
+
+
+def test_of_a_grid_the_values_at_its_ends_are_told() -> None:
+    """No value of a grid is rare; the corner that sizes a mechanism is what was asked for."""
+    cold, rub = (each.ravel() for each in np.meshgrid([213.0, 253.0, 293.0], [0.02, 0.05]))
+    one = made_campaign(6, kind="grid")
+    one = one.drop_vars([n for n, v in one.data_vars.items() if v.attrs.get("role") == "input"])
+    for name, values, units in (("temperature", cold, "K"), ("coulomb", rub, "N m")):
+        says = {"role": "input", "path": f"a.{name}", "input": name, "units": units}
+        one[name] = "sample", values, says
+    corner, middle = unusual(one, [3, 4])
+    assert corner == (
+        "temperature 213 K (-60 C, the lowest); coulomb 0.05 N m (+43 %, the highest)"
+    )
+    assert middle == "coulomb 0.05 N m (+43 %, the highest)"
 
 
 def test_chance_makes_one_sample_in_ten_unusual() -> None:

@@ -13,7 +13,7 @@ from ringsim.rigid.margin import PULLEYS
 from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.resistances import Opening, resistances
 from ringsim.scene import scene_from_toml
-from ringsim.simulation import simulate
+from ringsim.simulation import simulate, steps
 from ringsim.variables import Fate
 
 STIFFNESS, NEUTRAL = 300.0, 0.4
@@ -287,6 +287,44 @@ def test_a_rotor_takes_what_its_run_up_needs_however_few_steps_it_has(fidelity: 
         assert given[-1] == pytest.approx(float(found.work[-1]) / 0.6 + kept, rel=1e-3)
         assert float(found.peak_motor_current) == pytest.approx(0.01 / 0.02 + 0.05, rel=1e-9)
     assert given[0] == pytest.approx(given[1], rel=0.02)
+
+
+def test_a_rotor_that_is_switched_off_while_it_runs_up_took_what_it_had() -> None:
+    """w = w_0 (1 - exp(-t T / J w_0)) of a rope that hardly pulls yet; then a brake holds it."""
+    inertia, stop = 3e-7, 0.005
+    rotor = MOTOR | {"rotor_inertia": inertia, "stall_torque": 0.01}
+    values: dict[str, object] = {}
+    for plane in ("upper", "lower"):
+        winch = {"start_time": 0.0, "stop_time": stop, "winding": rotor}
+        values[f"cables.{plane}.winch"] = winch
+    found = []
+    for tolerance in (3e-3, 1e-5):
+        scene = ring(structure__sections=3, solver__end_time=0.1, solver__tolerance=tolerance)
+        run = simulate(scene.with_values(values), "frame")
+        found.append(float(run.total_motor_energy))
+    speed = 600.0 * (1.0 - np.exp(-stop * 0.01 / (inertia * 600.0)))
+    truth = inertia * speed**2 + float(run.work.max()) / 0.6
+    assert found == pytest.approx([truth, truth], rel=0.05)
+    assert found[1] == pytest.approx(truth, rel=0.01)
+
+
+def test_a_command_that_changes_asks_for_nothing_before_it() -> None:
+    """Work of the winches over the gear's efficiency, and J w^2 / 2 of each run-up: a step that
+    ends with a new command has none of its torque.  What slows down meets a brake.
+    """
+    inertia, planes = 1e-8, ("upper", "lower")
+    rotor = MOTOR | {"speed": 100.0, "rotor_inertia": inertia, "stall_torque": 0.01}
+    values = {f"cables.{plane}.winch.winding": rotor for plane in planes}
+    scene = ring(structure__sections=3, solver__end_time=0.3, solver__tolerance=3e-3)
+    run, speeds = steps(scene.with_values(values), period=0.05), [100.0, 200.0, 50.0, 250.0, 2.0]
+    speeds += 9 * [200.0]
+    for _, speed in zip(run, speeds, strict=False):
+        run.command(**dict.fromkeys(planes, TRAVEL * speed))
+    found = run.result
+    ups = [(0.0, 100.0), (100.0, 200.0), (50.0, 250.0), (2.0, 200.0)]
+    kept = 2.0 * sum(0.5 * inertia * (high**2 - low**2) for low, high in ups)
+    given, work = float(found.total_motor_energy), float(found.work[-1])
+    assert given == pytest.approx(work / 0.6 + kept, rel=0.02)
 
 
 def test_a_ramp_takes_the_jump_from_the_first_steps() -> None:
