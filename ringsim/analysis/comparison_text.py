@@ -11,7 +11,7 @@ from ringsim.analysis.comparison import BADNESS
 from ringsim.analysis.design import LOST, NOT_RUN, REACHED, UNKNOWN
 from ringsim.analysis.indices import largest_by_chance
 from ringsim.analysis.intervals import NOTHING, ROUND_OFF, TWIN, all_alike, is_moment, quantities
-from ringsim.analysis.requirements import COUNTS
+from ringsim.analysis.requirements import COUNTS, MARGINS
 from ringsim.analysis.study_text import Section
 from ringsim.outputs.base import DOUBT
 from ringsim.tables import (
@@ -396,7 +396,8 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
         rows.append((
             name, unit_text(unit),
             *(estimate_text(mean, low, high, fine) for mean in (first, second)),
-            estimate_text(apart, low, high), "-" if _is_place(name) else _percent(first, second),
+            estimate_text(apart, low, high),
+            "-" if _is_place(name) or name in MARGINS else _percent(first, second),
             interval_text(low, high),
             _worse(found, name),
             str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
@@ -451,9 +452,7 @@ def _is_place(name: str) -> bool:
 
 
 def _percent(first: float, second: float) -> str:
-    """The difference in percent of the first; of what may be below zero, as a margin, it would tell
-    nothing.
-    """
+    """The difference in percent of the first; of what may be below zero it would tell nothing."""
     if not (first > NOTHING and second > -NOTHING):
         return "-"
     percent = 100.0 * (second - first) / abs(first)

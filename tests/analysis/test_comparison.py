@@ -67,7 +67,7 @@ def test_a_difference_is_told_in_percent_of_what_is_not_zero():
     more = {
         "longest_motor_lag": (size, 0.0 * size), "peak_tension": (0.0 * size, size),
         "prestress_energy": (2.0 * size, size), "least_drive_margin": (size, -size),
-        "least_drive_margin_angle": (2.0 * size, size),
+        "least_drive_margin_angle": (2.0 * size, size), "least_plane_margin": (size, 2.0 * size),
     }  # fmt: skip
     sides = (campaign(size, sample_seed=seeds, **{n: both[k] for n, both in more.items()})
              for k in (0, 1))  # fmt: skip
@@ -76,7 +76,7 @@ def test_a_difference_is_told_in_percent_of_what_is_not_zero():
     told = {name: table[name][column] for name in more if name != "least_drive_margin"}
     assert told == {
         "longest_motor_lag": "-100", "peak_tension": "-", "prestress_energy": "-50",
-        "least_drive_margin_angle": "-",
+        "least_drive_margin_angle": "-", "least_plane_margin": "-",
     }  # fmt: skip
 
 
