@@ -132,7 +132,7 @@ def _shell() -> jinja2.Environment:
 def _sentence(line: str) -> str:
     """A line of a terminal as a sentence: with a capital, unless a name begins it."""
     first = line.split(maxsplit=1)[0] if line else ""
-    named = not first.isalpha() or first != first.lower()
+    named = not first.isalpha() or first != first.lower() or first == "ringsim"  # as it is typed
     return f"{line if named else line[0].upper() + line[1:]}."
 
 

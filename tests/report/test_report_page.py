@@ -615,6 +615,13 @@ def test_figures_stand_where_they_fill_the_sheets_of_a_printed_page() -> None:
 
 
 @pytest.mark.quick
+def test_a_sentence_that_begins_with_a_command_keeps_it_as_it_is_typed() -> None:
+    told = "ringsim compare --out FILE.nc stores all samples"
+    assert shell._sentence(told) == f"{told}."
+    assert shell._sentence("nothing differs") == "Nothing differs."
+
+
+@pytest.mark.quick
 def test_figures_are_reduced_by_the_little_that_they_do_not_fit() -> None:
     def sheets(high: float, wide: float, words: str = "") -> list[Sheet]:
         return filling([(name, words, Figure(figsize=(wide, high))) for name in "ab"])[1]
