@@ -21,6 +21,7 @@ from ringsim.cable import friction
 from ringsim.cable.control import OUTSIDE, Outside, Readings, checked, places_of
 from ringsim.choice import kind_of
 from ringsim.outputs.balance import with_bars
+from ringsim.outputs.base import SMOOTHED
 from ringsim.outputs.recorder import StoredState
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError, NotBuiltError, known_or_nearest, show
@@ -226,13 +227,18 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
     if not faded:
         return outcome
     slips, bounds, excesses = zip(*faded.values(), strict=True)
-    how = "much of the pulley friction is smoothed away, so that the ring opens too easily"
     if max(excesses) < 100.0 * _CRAWLS:
-        how = "pulley friction is smoothed"
-    remark = (
-        f"; {how}, tension up to {max(excesses):.0f} % too high: "
-        f"{' and '.join(faded)} = {max(slips):.2g} m/s must be at most {min(bounds):.2g} m/s"
-    )
+        remark = (
+            f"; pulley friction is smoothed, tension far from the winch up to {max(excesses):.0f} "
+            f"% too high: {' and '.join(faded)} = {max(slips):.2g} m/s must be at most "
+            f"{min(bounds):.2g} m/s"
+        )
+    else:
+        remark = (
+            f"; {SMOOTHED}: the ring moves too easily, and tensions are up to {max(excesses):.0f} "
+            "% too high far from the winch and may be too low near it, so asynchrony_max, "
+            f"peak_tension may be off: set {' and '.join(faded)} = {min(bounds):.2g} m/s"
+        )
     return replace(outcome, reason=outcome.reason + remark)
 
 

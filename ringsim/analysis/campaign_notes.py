@@ -7,7 +7,7 @@ import re
 import textwrap
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +45,7 @@ from ringsim.analysis.requirements import MARGINS, OUTCOME
 from ringsim.analysis.tails import subset_simulation
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
-from ringsim.outputs.base import DOUBT, UNCERTAIN, may_be_off, without_doubts
+from ringsim.outputs.base import DOUBT, UNCERTAIN, finest, may_be_off, without_doubts
 from ringsim.outputs.family import Array
 from ringsim.outputs.motors import left_by_winches
 from ringsim.overrides import flat
@@ -448,8 +448,6 @@ def marked(table: Table, analysis: xr.Dataset, column: int = 0) -> Table:
 # Outputs that runs call uncertain themselves, and the mark on them.
 
 
-DOUBTED = f"{DOUBT.strip()} may be off, since steps are too long at locks"
-"""What is said below a table with that mark."""
 OFF = "may_be_off"
 """Attribute of an analysis with what ``off_note`` tells, as JSON."""
 LATE, PLANE, RIGID = "late_winches", "plane_margin", "rigid_margin"
@@ -458,17 +456,18 @@ RECORDED = "of_records"
 """Attribute of an analysis with ``records_line``."""
 
 
-def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], str]:
-    """By output the samples in which it may be off, by what their runs say, and what cures all."""
-    held, found, cures = good(campaign), dict[str, Mask](), list[tuple[float, str]]()
+def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], dict[str, str]]:
+    """By output the samples in which it may be off, by what their runs say; and by what makes them
+    so what cures all of them.
+    """
+    held, found, cures = good(campaign), dict[str, Mask](), dict[str, str]()
     reasons = campaign["reason"].to_numpy() if "reason" in campaign else np.full(len(held), "")
     for place in np.flatnonzero(held).tolist():
-        names, cure = may_be_off(str(reasons[place]))
+        names, told = may_be_off(str(reasons[place]))
         for name in names:
             found.setdefault(name, np.zeros(len(held), dtype=bool))[place] = True
-        if value := _SETTING.search(cure):
-            cures.append((float(value[1]), cure))
-    return found, min(cures, default=(0.0, ""))[1]
+        cures |= {since: finest(cure, cures.get(since, cure)) for since, cure in told.items()}
+    return found, cures
 
 
 def uncertain_latches(campaign: xr.Dataset) -> Array:
@@ -531,17 +530,14 @@ def slow_latches(campaign: xr.Dataset) -> Array:
 _LATCHES = re.compile(rf"whether the latch of ([^;]*?)(?: and (\d+) more)? {UNCERTAIN}")
 
 
-_SETTING = re.compile(r"= ([\d.e+-]+)")
-
-
 def attributes(campaign: xr.Dataset) -> dict[str, str]:
     """What tables about a merged campaign must tell: lost runs, outputs that may be off, and drive
     margins before a winch starts.
     """
-    found, cure = doubtful(campaign)
+    found, cures = doubtful(campaign)
     counts = {name: int(own.sum()) for name, own in found.items()}
     counts = dict(sorted(counts.items(), key=lambda each: -each[1]))
-    told = {"samples": counts, "of": int(good(campaign).sum()), "cure": cure}
+    told = {"samples": counts, "of": int(good(campaign).sum()), "cures": cures}
     marks = {NOTE: losses(campaign).note, LATE: late_line(campaign), PLANE: plane_line(campaign)}
     marks |= {RIGID: rigid_line(campaign)}
     return marks | ({OFF: json.dumps(told)} if counts else {})
@@ -567,12 +563,17 @@ def off_note(says: Mapping[Any, Any]) -> str:
     (first, count), *others = told["samples"].items()
     more = "".join(f", {name} in {number}" for name, number in others)
     of = counted(told["of"], "sample")
-    return f"{DOUBTED}: {first} in {count} of {of}{more}; {told['cure']}"
+    cures = " and ".join(told["cures"].values())
+    return f"{_doubted(told['cures'])}: {first} in {count} of {of}{more}; {cures}"
 
 
-def doubted(table: Table, says: Mapping[Any, Any], said: str = DOUBTED) -> Table:
+def _doubted(causes: Iterable[str]) -> str:
+    return f"{DOUBT.strip()} may be off, since {' or '.join(causes)}"
+
+
+def doubted(table: Table, says: Mapping[Any, Any], said: str = "") -> Table:
     """A table with the mark behind the names of outputs that may be off, wherever it has them, and
-    what is ``said`` of it below, out of ``attributes``.
+    below it what is ``said`` of the mark, or why they may be, out of ``attributes``.
     """
     if not (names := off_counts(says)):
         return table
@@ -586,4 +587,5 @@ def doubted(table: Table, says: Mapping[Any, Any], said: str = DOUBTED) -> Table
         notes=mark(table.notes), title=mark([table.title])[0],
     )  # fmt: skip
     every = [found.title, *found.head, *found.notes, *(cell for row in found.rows for cell in row)]
+    said = said or _doubted(json.loads(says[OFF])["cures"])
     return found._replace(notes=[*found.notes, *[said] * any(DOUBT in each for each in every)])

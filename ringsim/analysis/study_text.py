@@ -10,7 +10,6 @@ import xarray as xr
 
 from ringsim.analysis import derived
 from ringsim.analysis.campaign_notes import (
-    DOUBTED,
     MARK,
     NOTE,
     RECORDED,
@@ -233,7 +232,7 @@ def sections(
     says = analysis.attrs
 
     def kept(of: Section, tables: Sequence[Table]) -> list[Table]:
-        said = off_note(says) if of.name == "statistics" else DOUBTED
+        said = off_note(says) if of.name == "statistics" else ""
         return [doubted(each, says, said) for each in tables if each.rows or each.notes]
 
     return {

@@ -412,6 +412,8 @@ def _next(campaign: Folder, left: int, growth: str) -> str:
     """What to do next, as a command; what grows is merged once it has all its samples."""
     folder = shlex.quote(str(campaign.path))
     if runs_in(campaign.path):
+        if not left and not len(campaign.unchecked()):
+            return "wait: the results of all samples are being merged, and figures drawn"
         return f"wait; ringsim merge {folder} gives the results so far"
     if left or len(campaign.unchecked()) or (growth and not (campaign.path / MERGED).exists()):
         return f"ringsim campaign FILE --out {folder} continues it"

@@ -132,7 +132,7 @@ def run_command(
         raise InputError("--colour stress: needs the stresses: give --set record.stress=true, too")
     target = out or Path(f"{chosen.name}.nc")
 
-    from ringsim.outputs.recorder import below_limits
+    from ringsim.outputs.recorder import against_limits
     from ringsim.simulation import run, run_frame
 
     require_file(target)
@@ -178,7 +178,7 @@ def run_command(
             label = (VARIABLES[name].summary or ("",))[0] + DOUBT * (name in off)
             if anew or name != "total_steps":
                 click.echo(f"  {label:20s}{told}")
-        for told in below_limits(chosen, values):
+        for told in against_limits(chosen, values):
             click.echo(f"  {told}")
     for line in lines:
         click.echo(f"  {line}")

@@ -275,25 +275,33 @@ def _shaken(run: Run, shocks: Mapping[str, float]) -> Iterator[TooLong]:
             yield TooLong(enough / float(own.max()), name, what, float(own.max()), lock)
 
 
+SMOOTHED = "much of the pulley friction is smoothed away"
 _OFF = re.compile(
-    r"; steps of [^;]* are too long for [^;]*, so ([^;]*) may be off: "
+    rf"; (?:steps of|({SMOOTHED}))[^;]*, so ([^;]*) may be off: "
     r"([^;(]*(?:\([^;()]*times the steps\))?)"
 )
 _VALUE = re.compile(r"= ([\d.e+-]+)")
 
 
-def may_be_off(reason: str) -> tuple[list[str], str]:
-    """The numbers that ``unresolved`` has called wrong in a reason, and what cures them all.
+def may_be_off(reason: str) -> tuple[list[str], dict[str, str]]:
+    """The numbers that a run calls wrong in its reason, and by what makes them so what cures it.
 
     >>> told = "; steps of 1 s are too long for shocks, so {} may be off: set solver.step = {}"
     >>> may_be_off("done" + told.format("a, b", 0.02) + told.format("c", 0.01) + " (start 2)")
-    (['a', 'b', 'c'], 'set solver.step = 0.01')
+    (['a', 'b', 'c'], {'steps are too long at locks': 'set solver.step = 0.01'})
     """
     found = _OFF.findall(reason)
-    cures = [cure.strip() for _, cure in found]
+    cures: dict[str, str] = {}
+    for smoothed, _, told in found:
+        since = smoothed or "steps are too long at locks"
+        cures[since] = finest(told.strip(), cures.get(since, ""))
+    return [name for _, each, _ in found for name in each.split(", ")], cures
+
+
+def finest(*cures: str) -> str:
+    """That of some cures which sets the smallest value, and so serves for all of them."""
     values = [float(value[1]) if (value := _VALUE.search(cure)) else math.inf for cure in cures]
-    names = [name for each, _ in found for name in each.split(", ")]
-    return names, cures[values.index(min(values))] if cures else ""
+    return cures[values.index(min(values))]
 
 
 def without_doubts(reason: str) -> str:

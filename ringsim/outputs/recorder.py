@@ -233,8 +233,8 @@ def overloads(
     return found
 
 
-def below_limits(scene: Scene, values: Values) -> Iterator[str]:
-    """The margin of each load that stayed below the limit of the scene; nothing of others."""
+def against_limits(scene: Scene, values: Values) -> Iterator[str]:
+    """The margin of each load for which the scene has a limit; nothing of others."""
     for output in OUTPUTS:
         most = getattr(scene.limits, output.limit) if output.limit else None
         series, *others = output.variables
@@ -243,13 +243,13 @@ def below_limits(scene: Scene, values: Values) -> Iterator[str]:
         (peak,) = (one for one in others if one.largest_of == series.name)
         # A peak may count up to the last lock, a limit holds for the whole run.
         largest = max(float(values[peak.name]), float(np.nanmax(values[series.name])))
-        if 0.0 < largest <= most and peak.summary is not None:
+        if largest > 0.0 and peak.summary is not None:
             yield (
                 f"{peak.summary[0]}: margin {most / largest - 1.0:+.3g} (limit / value - 1) to "
                 f"limits.{output.limit} = {with_unit(f'{most:g}', peak.units)}"
             )
     most, longest = scene.limits.slack_duration, float(values.get("longest_slack", np.nan))
-    if most is not None and 0.0 < longest <= most:
+    if most is not None and longest > 0.0:
         yield (
             f"longest slack: margin {most / longest - 1.0:+.3g} (limit / value - 1) to "
             f"limits.slack_duration = {most:g} s"
