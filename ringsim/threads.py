@@ -4,7 +4,9 @@ import contextlib
 import ctypes
 import importlib
 import os
+import sys
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from pathlib import Path
 
 ENVIRONMENT = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -24,8 +26,19 @@ def one_thread_from_here_on() -> None:
     os.environ.update(dict.fromkeys(ENVIRONMENT, "1"))
 
 
-def thread_counts() -> list[tuple[Callable[[], int], Callable[[int], None]]]:
-    """Functions that get and set the number of threads, for each OpenBLAS in this process."""
+Counts = list[tuple[Callable[[], int], Callable[[int], None]]]
+"""Functions that get and set the number of threads of libraries."""
+
+
+def thread_counts() -> Counts:
+    """Those of each OpenBLAS in this process."""
+    # To look for them takes 3 % of a fast run; libraries come with modules that need them.
+    return _counts(len(sys.modules))
+
+
+@lru_cache(maxsize=1)
+def _counts(modules: int) -> Counts:
+    """Those of each OpenBLAS that is loaded together with so many modules."""
     # Field by field: address range, rights, offset, device, inode, and the file if there is one.
     lines = (line.split(maxsplit=5) for line in Path("/proc/self/maps").read_text().splitlines())
     files = {fields[5] for fields in lines if len(fields) > 5 and ".so" in fields[5]}

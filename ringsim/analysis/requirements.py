@@ -229,8 +229,8 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
             )
         if name in table:
             raise InputError(f"--require {name} is given twice: leave out one of the two")
-        if place:
-            many = name in VARIABLES and VARIABLES[name].dims
+        # First of what may be wrong: with another output other bounds make sense.
+        if (many := bool(name in VARIABLES and VARIABLES[name].dims)) or place:
             cure = instead_of(name) if many else f"a sample has one value: leave out {place}"
             raise InputError(f"--require {name}{place}: {cure}")
         for part in parts:

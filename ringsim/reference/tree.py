@@ -120,7 +120,8 @@ def known(path: str, others: list[str]) -> list[Found]:
     every = [one for root in ROOTS for one in paths(root)]
     plain = re.sub(r"\[[^\]]*\]", "", path)
     ends = list(dict.fromkeys(one for one in every if one.endswith(f".{plain}")))
-    if len(ends) == 1:
+    meant = {found.key.meaning for each in ends for found in find(each)}
+    if len(meant) == 1:
         return find(ends[0])
     kind = [
         each for root in ROOTS for model, where in places(root).items() for each in where

@@ -184,9 +184,9 @@ def verdicts(of: Of, name: str = "") -> Answer:
 
 
 def drawn_lines(of: Of, chosen: Callable[[str, str], bool]) -> list[str]:
-    """Inputs that are chosen by path and unit, with their laws and what was drawn."""
+    """Inputs that are chosen by path and unit, with their laws and the values that samples have."""
     return [
-        f"{name}: {law}; drawn: {extent} {unit}".rstrip(" -")
+        f"{name}: {law}; values: {extent} {unit}".rstrip(" -")
         for name, unit, _, law, extent, paths in drawn_inputs(of.campaign)
         if any(chosen(path, unit) for path in paths.split(", "))
     ]

@@ -439,7 +439,7 @@ def _verification(of: Of) -> Answer:
 
 
 _ORIGINS = {
-    "drawn": "drawn", "drawn in part": "drawn in part", "campaign": "set by the campaign",
+    "drawn": "varied", "drawn in part": "varied in part", "campaign": "set by the campaign",
     "inferred": "marked inferred in the scene", "scene": "of the scene's file",
     "default": "defaults of ringsim",
 }  # fmt: skip

@@ -81,6 +81,7 @@ def test_wrong_requirements_are_told_with_the_cure(table, words):
         (["asynchrony_max: 10"], "must read NAME: KEY VALUE"),
         (["outcome: is deployed", "outcome: is folded"], "given twice"),
         (["latch_rate[upper,2]: max 3"], r"latch_rate\[upper,2\]: .*its largest, peak_latch_rate"),
+        (["latch_rate: min 0.1"], "require latch_rate: .*its least, least_latch_rate"),
         (["peak_tension[1]: max 3"], r"peak_tension\[1\]: a sample has one value: leave out \[1\]"),
         (["asynchrony_max: max 10 rad, probability 0.9"], "max = 10 rad: give it in deg"),
     ],

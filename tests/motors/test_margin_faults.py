@@ -169,7 +169,7 @@ def test_check_says_what_it_counts(tmp_path: Path) -> None:
     jam = {"kind": "jammed-pulley", "cable": "lower", "pulley": 9, "time": 0.0}
     strong = {f"cables.{p}.winch.winding.stall_torque": 1.0 for p in ("upper", "lower")}
     jammed = told(load_scene("ring18-motor").with_values({"faults": [jam]} | strong))
-    assert "jammed-pulley at 0 s: counted, for a rigid ring: its driven sections open" in jammed
+    assert "jammed-pulley at 0 s: counted, for a rigid ring, which opens as one: whether" in jammed
     verdicts = re.findall(r"least margin .* deg: (.*)$", jammed, re.M)
     assert [*verdicts] == ["enough for a rigid ring"] * 3  # of both planes, and of each
     stuck = told(sprung(faults=[{"kind": "stuck-vjoint", "section": 1, "time": 0.0}]))

@@ -124,7 +124,7 @@ def test_keys_that_scenes_and_campaigns_share_are_told_of_both() -> None:
     ("name", "meant"),
     [
         ("cables.upper.winsh", "did you mean cables.upper.winch?"),
-        ("initial_slack", "did you mean cables.upper.initial_slack or "),
+        ("coefficient", "did you mean cables.upper.friction.coefficient or "),
         ("structure.section", "did you mean structure.sections?"),
         ("rods.young_modulos[3]", "did you mean rods.young_modulus?"),
         ("dessign", "did you mean design?"),
@@ -149,6 +149,8 @@ def test_the_end_of_a_path_that_is_the_only_one_is_enough() -> None:
     found = CliRunner().invoke(cli, ["explain", "half_bar"])
     assert found.exit_code == 0
     assert found.output.startswith("structure.half_bar (scene file")
+    # Of both cables it is the same key.
+    assert explain("initial_slack").startswith("cables.upper.initial_slack (scene file")
 
 
 @for_each(

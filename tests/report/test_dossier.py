@@ -213,7 +213,7 @@ KNOWN = {
         worst,
     rf"(?P<output>\w+) most by (?P<input>[\w.]+): .*partial rank correlation (?P<value>{N}) "
     r"\((?P<ends>.+)\)": matters,
-    rf"(?P<name>[\w.]+): uniform, low 0, high 1; drawn: (?P<low>{N}) to (?P<high>{N}) m": drawn,
+    rf"(?P<name>[\w.]+): uniform, low 0, high 1; values: (?P<low>{N}) to (?P<high>{N}) m": drawn,
     r"(?P<count>\d+) values: (?P<parts>.+)": summed,
     r"(peak_tension): largest of .*": anything,  # as in its row
     r"(?P<count>\d+) samples": held,
@@ -357,7 +357,7 @@ def test_temperatures_are_told_with_what_became_of_the_antennas_and_remarks_of_r
     campaign["reason"] = "sample", np.array(["all open; friction is smoothed"] * 4, dtype=object)
     own = row(rows_of(campaign), "Thermal design")
     assert own["state"] == "in part"
-    assert "drawn: 220 to 300 K" in own["result"]
+    assert "values: 220 to 300 K" in own["result"]
     assert "deployed: 4 of 4" in own["result"]
     assert "Missing: gradients" in own["result"]
     evidence = row(rows_of(campaign), "Integrity check")["evidence"]
@@ -401,7 +401,7 @@ def test_more_of_a_campaign_is_analysed_once_it_has_it() -> None:
     assert "in sample 0 it is least at 20 deg, 20 s" in drive["result"]
     assert "below 0 in 5 of 12 samples: NOT enough" in drive["result"]  # -0.5 + 0.1 k
     assert "friction 3.0" in drive["evidence"]
-    assert "drawn: 225 to 325 K" in row(rows, "Thermal design")["result"]
+    assert "values: 225 to 325 K" in row(rows, "Thermal design")["result"]
     assert "upper_bar" in row(rows, "Tolerance budget")["result"]
     # 80 N over 20 + 11 N, less 1.
     strength = row(rows, "Margin of safety")
