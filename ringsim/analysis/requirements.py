@@ -232,7 +232,7 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
         # First of what may be wrong: with another output other bounds make sense.
         if (many := bool(name in VARIABLES and VARIABLES[name].dims)) or place:
             cure = instead_of(name) if many else f"a sample has one value: leave out {place}"
-            raise InputError(f"--require {name}{place}: {cure}")
+            raise InputError(f"--require {name}{place or ''}: {cure}")
         for part in parts:
             _require_unit(name, part[1], part[2], part[3])  # type: ignore[index]
         table[name] = {part[1]: _value(part[2]) for part in parts if part}

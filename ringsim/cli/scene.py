@@ -410,8 +410,8 @@ def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
             words = "strikes later, not included here; a run includes it from then on"
         elif words == "counted" and isinstance(fault, CableFault):
             words += (
-                ", for a rigid ring, which opens as one: whether the sections behind the fault open, "
-                "a run tells"
+                ", for a rigid ring, which opens as one: whether the sections behind the fault "
+                "open, a run tells"
             )
         yield f"faults[{number}], {kind_of(fault)} at {fault.time:g} s: {words}"
     for where, winch in drive.conditions.winches.items():
