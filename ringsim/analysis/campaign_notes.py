@@ -81,12 +81,19 @@ def notes(campaign: xr.Dataset) -> list[str]:
 def outcome_lines(campaign: xr.Dataset) -> list[str]:
     """What became of the antenna, and which runs failed: a line an end, with the first reason."""
     reasons = campaign["reason"].to_numpy() if "reason" in campaign else None
-    locks = "deployment_time" in campaign
     return ending_lines(
         campaign["outcome"].to_numpy(), campaign["status"].to_numpy(),
         lambda sample: "" if reasons is None else str(reasons[sample]),
-        np.isfinite(numbers(campaign, "deployment_time")) if locks else None,
+        opened(campaign) if "deployment_time" in campaign else None,
     )  # fmt: skip
+
+
+def opened(campaign: xr.Dataset) -> Mask:
+    """Which antennas have opened, however they ended: all V-joints have come to 180 deg, and the
+    latches of none of them have missed.
+    """
+    caught, come = (numbers(campaign, f"{name}_joints") for name in ("latched", "locked"))
+    return np.asarray(np.isfinite(numbers(campaign, "deployment_time")) & ~(caught < come))
 
 
 def ending_lines(
@@ -162,7 +169,7 @@ _LATE = "the least drive margin is that of "
 
 def reached_by_words(campaign: xr.Dataset, start: str) -> list[str]:
     """How many samples reached their goal with each word that was drawn of inputs whose paths begin
-    so, as "deployed with none: 37 of 37".
+    so, as "deployed without faults: 37 of 37".
     """
     held, words, lines = ran(campaign), endings(campaign), list[str]()
     came = np.isin(words, REACHED)
@@ -176,7 +183,8 @@ def reached_by_words(campaign: xr.Dataset, start: str) -> list[str]:
             own = held & (told == word)
             gone = int((own & ~good(campaign)).sum())
             more = f", {counted(gone, 'failed run')}" * bool(gone)
-            lines.append(f"deployed with {word}: {int((own & came).sum())} of {count}{more}")
+            how = f"without {start}" if word == "none" else f"with {word}"
+            lines.append(f"deployed {how}: {int((own & came).sum())} of {count}{more}")
         if (left := len(drawn_words) - _MOST_WORDS) > 0:
             lines.append(f"and with {counted(left, 'other value')}: see campaign.nc")
     return lines

@@ -26,19 +26,7 @@ from ringsim.analysis.design import (
     population_of,
 )
 from ringsim.analysis.indices import centred_ranks, correlations
-from ringsim.analysis.intervals import (
-    NONE,
-    TWIN,
-    Mask,
-    Twins,
-    difference_of_pairs,
-    difference_of_shares,
-    good,
-    hardly_apart,
-    lost,
-    numbers,
-    quantities,
-)
+from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities
 from ringsim.analysis.requirements import (
     OUTCOME,
     badness_of,
@@ -201,7 +189,7 @@ def _compared(
     if not all(counts) or not has_means(both, placed, len(pairs[0])):
         return (*counts, *[np.nan] * 5)
     shares = float(first.mean()), float(second.mean())
-    bounds = NONE
+    bounds = intervals.NONE
     if all(each.has_intervals for each in placed):
         index = [each["sample"].to_numpy()[k] for each, k in zip(both, places, strict=True)]
         replicates = [p.replicate_of(i) for p, i in zip(placed, index, strict=True)]
@@ -215,7 +203,7 @@ def _paired(first: Any, second: Any, replicates: list[Any]) -> intervals.Interva
     apart, few = second - first, sum(only) < _FEW
     if replicates[0] is None or few or intervals.agree(apart, replicates[0]) or not np.ptp(apart):
         together = int((first * second).sum())
-        return difference_of_pairs(together, *only, len(first) - together - sum(only))
+        return intervals.difference_of_pairs(together, *only, len(first) - together - sum(only))
     low, high = intervals.of_replicates(apart, replicates[0], np.mean)
     return max(-1.0, float(low)), min(1.0, float(high))
 
@@ -224,7 +212,7 @@ def _independent(first: Any, second: Any, replicates: list[Any]) -> intervals.In
     counts = [(int(each.sum()), len(each)) for each in (first, second)]
     few = any(min(own, of - own) < _FEW for own, of in counts)
     if few or all(each is None for each in replicates):
-        return difference_of_shares(counts[0], counts[1])
+        return intervals.difference_of_shares(counts[0], counts[1])
     low, high = intervals.of_difference(first, second, tuple(replicates))
     return max(-1.0, float(low)), min(1.0, float(high))
 
@@ -301,7 +289,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
             NOTE: "; ".join(f"{side}: {each}" for side, each in notes.items() if each),
         },
     )  # fmt: skip
-    wanted, twins = [required_by(each.attrs) for each in (first, second)], Twins()
+    wanted, twins = [required_by(each.attrs) for each in (first, second)], intervals.Twins()
     for name in quantities():
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
@@ -311,7 +299,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
                     name, np.concatenate([numbers(each, name)[good(each)] for each in (one, other)])
                 )
                 if twin and not any(name in each for each in wanted):
-                    found[f"{name}_difference"].attrs[TWIN] = twin
+                    found[f"{name}_difference"].attrs[intervals.TWIN] = twin
     for side, mine, its in zip(SIDES, (first, second), (second, first), strict=True):
         only = (name for name in quantities() if name in mine and name not in its)
         found.attrs[f"only_{side}"] = ", ".join(only)
@@ -364,10 +352,6 @@ def _limits(both: Both) -> dict[str, Any]:
     return found
 
 
-_SCENES_OWN = ("name", "title")
-"""Values of a scene that say nothing of its antenna."""
-
-
 def settings(both: Both) -> dict[str, Any]:
     """The values in which the scenes differ, as text by path: ``setting_first``, ``_second``.
 
@@ -383,7 +367,7 @@ def settings(both: Both) -> dict[str, Any]:
     paths = dict.fromkeys(path for scene in scenes for path in scene) if all(scenes) else {}
     apart = [
         path for path in paths
-        if path not in _SCENES_OWN and scenes[0].get(path) != scenes[1].get(path)
+        if path not in ("name", "title") and scenes[0].get(path) != scenes[1].get(path)
         and path not in drawn[0] | drawn[1]  # then its samples have values of their own
         and [scene[path] for scene in scenes if path in scene] != [[]]  # all, by default
     ]  # fmt: skip
@@ -455,43 +439,61 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
     """Pairs of samples with equal seeds in equal designs, else of samples with equal inputs.
 
     Equal seeds are draws at the same place of the unit cube, also where the distribution of an
-    input is another; but only of one design, whose samples do not depend on results.
+    input is another; but only of one design, whose samples do not depend on results, and only if
+    no other input of one has moved the places of those behind it.
     """
-    inputs = [
-        str(name)
-        for name, v in first.data_vars.items()
+    known = [
+        str(name) for name, v in first.data_vars.items()
         if v.attrs.get("role") == "input" and name in second and v.dims[0] == "sample"
-        and v.shape[1:] == second[name].shape[1:]
+        and not str(v.attrs.get("path", "")).startswith("solver.")
     ]  # fmt: skip
-    designs = [(each.kind, each.replicates) for each in map(placement, (first, second))]
-    seeds = "sample_seed"
-    grows = subset_simulation(first.attrs) is not None
-    if designs[0] == designs[1] and not grows and seeds in first and seeds in second:
+    inputs = [name for name in known if first[name].shape[1:] == second[name].shape[1:]]
+    designs, seeds = (
+        [(p.kind, p.replicates) for p in map(placement, (first, second))],
+        "sample_seed",
+    )
+    grows, alike = subset_simulation(first.attrs) is not None, designs[0] == designs[1]
+    why = f"neither their {'seeds' if alike else 'designs'} nor their inputs are equal"
+    if alike and not grows and seeds in first and seeds in second:
         keys = [list(each[seeds].to_numpy().tolist()) for each in (first, second)]
         if (found := _matched(*keys))[0].size:
-            other = [
-                called(first[name]) for name in inputs
-                if not str(first[name].attrs.get("path", "")).startswith("solver.")
-                and not np.array_equal(
-                    first[name].to_numpy()[found[0]], second[name].to_numpy()[found[1]]
-                )
-            ]  # fmt: skip
-            told = "samples are paired by their seeds"
-            if other:
-                told += f"; their inputs differ in {', '.join(dict.fromkeys(other))}"
-            return Pairs(*found, told)
+            other, moved = _unlike((first, second), known, found)
+            if not moved:
+                told = f"; their inputs differ in {', '.join(other)}" * bool(other)
+                return Pairs(*found, f"samples are paired by their seeds{told}")
+            why = (
+                f"with equal seeds and distributions {', '.join(moved)} have other values, since "
+                "other inputs have moved their draws (in random designs inputs behind them do not: "
+                "put those with each_section, and further ones, last)"
+            )
     rows = [_rows(each, inputs) for each in (first, second)]
     if inputs and all(len(set(each)) == len(each) for each in rows):
         found = _matched(*rows)
         if found[0].size:
             return Pairs(*found, "samples are paired by their inputs")
     none = np.zeros(0, dtype=np.int64)
-    unlike = "seeds" if designs[0] == designs[1] else "designs"
     return Pairs(
         none, none,
-        f"samples are not paired, because neither their {unlike} nor their inputs are equal; pairs "
-        "show smaller differences: give both campaigns the same seed, design and number of samples",
+        f"samples are not paired, because {why}; pairs show smaller differences: give both "
+        "campaigns the same seed, design, number of samples and inputs",
     )  # fmt: skip
+
+
+def _unlike(both: Both, known: list[str], pairs: Places) -> tuple[list[str], list[str]]:
+    """Names of inputs whose values are unlike in pairs, and of those that should be alike."""
+    other, moved = list[str](), list[str]()
+    for one, two in ([each[name] for each in both] for name in known):
+        name = called(one)
+        if one.shape[1:] != two.shape[1:]:
+            other.append(f"{name} ({one[0].size} and {two[0].size} places)")
+            continue
+        apart = one.to_numpy()[pairs[0]] != two.to_numpy()[pairs[1]]
+        other += [name] * bool(apart.any())
+        law = distribution_of(one)
+        drawn = law.get("kind", "function") != "function" and law == distribution_of(two)
+        # A place with a distribution of its own leaves the others as they are.
+        moved += [name] * (drawn and bool(apart.any(axis=0).all()))
+    return list(dict.fromkeys(other)), list(dict.fromkeys(moved))
 
 
 def _rows(campaign: xr.Dataset, inputs: list[str]) -> list[Any]:
@@ -516,7 +518,7 @@ def _output(
     values = [np.where(good(each), numbers(each, name), np.nan) for each in both]
     index = [each["sample"].to_numpy() for each in both]
     largest, where, together = np.nan, -1, np.nan
-    ends: tuple[Any, Any] = NONE
+    ends: tuple[Any, Any] = intervals.NONE
     certain = all(each.has_intervals for each in placed)
     if len(pairs.first):
         one, other = values[0][pairs.first], values[1][pairs.second]
@@ -526,7 +528,9 @@ def _output(
         if len(apart):
             worst = int(np.abs(apart).argmax())
             largest, where = apart[worst], int(index[0][pairs.first][known][worst])
-        if len(apart) >= _LEAST_PAIRS and not any(hardly_apart(x.min(), x.max()) for x in used):
+        if len(apart) >= _LEAST_PAIRS and not any(
+            intervals.hardly_apart(x.min(), x.max()) for x in used
+        ):
             (together,) = correlations(centred_ranks(used[0][:, None]), used[1]).tolist()
         if certain:
             ends = placed[0].interval(apart, index[0][pairs.first][known], np.mean)
@@ -541,7 +545,7 @@ def _output(
             ends = intervals.of_difference(used[0], used[1], which)
     if not all(map(len, used)):  # one of them may have none, as of a ring that stays closed
         used = [each[np.isfinite(each)] for each in values]
-        ends = NONE
+        ends = intervals.NONE
     if not any(map(len, used)):
         return {}
     means = np.array([each.mean() if len(each) else np.nan for each in used])
@@ -552,12 +556,9 @@ def _output(
         "difference": ((), means[1] - means[0], "second minus first"),
         "difference_interval": ("bound", np.array(ends), "interval of 95 % of the difference"),
         "samples": ("side", np.array([len(each) for each in used]), "samples compared"),
-        "numerical_error": (
-            "side",
-            np.array([_bar_of(each, name) for each in both]),
-            "root mean square of the error bars",
-        ),
     }
+    bars = np.array([_bar_of(each, name) for each in both])
+    rows["numerical_error"] = "side", bars, "root mean square of the error bars"
     if len(pairs.first):
         rows["largest_difference"] = (), largest, "largest difference of a pair"
         rows["largest_difference_sample"] = (

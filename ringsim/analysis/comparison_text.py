@@ -277,7 +277,10 @@ def _limits(found: xr.Dataset) -> Table:
             quantities()[one["limit_output"].item()].units, np.abs(values).max()
         )
         worst = (with_unit(number_text(factor * value), units) for value in values.tolist())
-        rows.append((str(text), *worst, *(f"{m:+.3g}" for m in one["limit_margin"].values)))
+        margins = one["limit_margin"].values.tolist()
+        rows.append(
+            (str(text), *worst, *(f"{m:+.3g}{': NOT enough' * (m < 0.0)}" for m in margins))
+        )
     heads = (f"{what} in {name}" for what in ("worst value", "margin") for name in names)
     return Table(("limit", *heads), rows, left=1)
 

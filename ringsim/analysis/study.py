@@ -19,6 +19,7 @@ from ringsim.analysis.campaign_notes import (
     RECORDED,
     attributes,
     off_counts,
+    opened,
     records_line,
     remark_lines,
 )
@@ -388,7 +389,7 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
             for side, each in enumerate((own, most))
         ]
     counts = [(own.sum(), most.sum() - own.sum()) for own, most in rows.values()]
-    opened = np.isfinite(numbers(campaign, "deployment_time"))
+    open_ = opened(campaign)
     population = placed.population
     return xr.Dataset(
         {
@@ -405,8 +406,8 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
             ),
             **({
                 "outcome_open": (
-                    "kind", np.array([int((own & opened).sum()) for own, _ in rows.values()]),
-                    about("samples of the kind in which all V-joints have locked"),
+                    "kind", np.array([int((own & open_).sum()) for own, _ in rows.values()]),
+                    about("samples of the kind in which all V-joints have locked and latched"),
                 ),
             } if "deployment_time" in campaign else {}),
             "outcome_share": (

@@ -15,6 +15,7 @@ from ringsim.analysis.campaign_notes import (
     doubtful,
     drive_notes,
     marked,
+    opened,
     slow_latches,
     uncertain_latches,
 )
@@ -307,8 +308,8 @@ def _ended_short(campaign: xr.Dataset) -> Mask:
     if OUTCOME not in campaign:
         return np.zeros(campaign.sizes["sample"], dtype=bool)
     fate = campaign[OUTCOME].to_numpy()
-    opened = (fate == Fate.OVERLOADED) & np.isfinite(numbers(campaign, "deployment_time"))
-    return np.asarray(~np.isin(fate, [-1, Fate.NONE, *GOALS]) & ~opened)
+    at_last = (fate == Fate.OVERLOADED) & opened(campaign)
+    return np.asarray(~np.isin(fate, [-1, Fate.NONE, *GOALS]) & ~at_last)
 
 
 def verdict_of(low: float, high: float, probability: float) -> Verdict:
@@ -374,8 +375,7 @@ def _together_told(analysis: xr.Dataset, count: int) -> str:
 
 def verdict_table(analysis: xr.Dataset) -> Table:
     """The verdicts, a row a requirement; no rows without requirements."""
-    rows, notes, chosen = [], list[str](), False
-    never = dict[tuple[str, str], list[str]]()
+    rows, notes, chosen, never = [], list[str](), False, dict[tuple[str, str], list[str]]()
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         one = verdict_about(analysis, name)
         verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
@@ -383,9 +383,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         bad, used = one["samples_violating"], one["samples_used"]
         if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
             one["probability"], chosen = np.nan, True
-            k = one["samples_close"]
-            but = f"; {k}, on either side of the limit, are closer to it than the numerical error"
-            notes.append(f"{name}: {bad} of {used} samples violate it{but * bool(k)}")
+            but = f"; of all, {one['samples_close']} within the numerical error of the limit"
+            but *= bool(one["samples_close"])
+            notes.append(f"{name}: {bad} of {used} samples violate it{but}")
         rows.append((
             one["requirement_text"], verdict_text(one), f"{one['probability_required']:g}",
             f"{one['confidence_required']:g}", number_text(one["probability"]),

@@ -417,7 +417,7 @@ def test_how_many_reach_their_goal_with_each_drawn_fault() -> None:
     law = {"role": "input", "path": "faults", "distribution": '{"kind": "discrete"}'}
     made["faults"] = "sample", np.array(words, dtype=object), law
     made["outcome"] = "sample", np.where(np.array(words) == "jam", 3, 1)
-    told = ["deployed with none: 5 of 5", "deployed with jam: 0 of 3"]
+    told = ["deployed without faults: 5 of 5", "deployed with jam: 0 of 3"]
     assert reached_by_words(made, "faults") == told
     made["status"][0] = Status.DIVERGED
     assert reached_by_words(made, "faults")[1] == "deployed with jam: 0 of 3, 1 failed run"

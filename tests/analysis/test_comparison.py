@@ -181,6 +181,49 @@ def test_seeds_pair_samples_of_campaigns_of_other_lengths_also_with_other_inputs
     assert difference(found)[1] == pytest.approx((SHIFTED - VALUES)[50:].mean())
 
 
+def test_seeds_pair_nothing_where_other_inputs_have_moved_the_draws():
+    """An input with a value for each pulley before it, of which one campaign has more: the same
+    distribution then has other values, and sample k is another antenna."""
+    law = '{"kind": "uniform", "low": 0.0, "high": 1.0}'
+    draws, pulleys = RANDOM.random((3, COUNT)), RANDOM.random((COUNT, 6))
+    both = []
+    for count, own, values in ((5, draws[0], VALUES), (6, draws[1], SHIFTED)):
+        made = with_input(seeded(values), own).assign(
+            friction=(("sample", f"pulley_{count}"), pulleys[:, :count])
+        )
+        for name, path in (("loads_force", "loads.force"), ("friction", "friction")):
+            made[name].attrs |= {"role": "input", "path": path, "distribution": law}
+        both.append(made)
+    told = compare(*both).attrs
+    assert told["pairs"] == 0
+    assert told["pairing"].startswith(
+        "samples are not paired, because with equal seeds and distributions loads.force have other"
+    )
+    # Behind nothing whose number of places changes it keeps its values; the pulleys are named.
+    both[1]["loads_force"][:] = draws[0]
+    told = compare(*both).attrs
+    assert told["pairs"] == COUNT
+    assert told["pairing"].endswith("; their inputs differ in friction (5 and 6 places)")
+    # A distribution of its own, or what follows an input, is another value of the same draw.
+    both[1]["loads_force"][:] = 2.0 * draws[0]
+    follows = '{"kind": "function", "input": "x", "table": [[0.0, 1.0], [1.0, 2.0]]}'
+    for laws in ((law, law.replace("1.0", "2.0")), (follows, follows)):
+        for each, own in zip(both, laws, strict=True):
+            each["loads_force"].attrs["distribution"] = own
+        assert compare(*both).attrs["pairs"] == COUNT
+
+
+def test_one_place_with_a_distribution_of_its_own_leaves_samples_paired():
+    law, values = '{"kind": "uniform", "low": 0.0, "high": 1.0}', RANDOM.random((COUNT, 4))
+    both = []
+    for factor, outputs in ((1.0, VALUES), (3.0, SHIFTED)):
+        own = values * np.array([1.0, factor, 1.0, 1.0])
+        says = {"role": "input", "path": "friction", "distribution": law}
+        both.append(seeded(outputs).assign(friction=(("sample", "pulley"), own, says)))
+    told = compare(*both).attrs
+    assert told["pairing"] == "samples are paired by their seeds; their inputs differ in friction"
+
+
 def test_inputs_pair_samples_where_seeds_do_not():
     order, force = RANDOM.permutation(COUNT), np.linspace(0.01, 0.02, COUNT)
     one = with_input(seeded(VALUES), force)

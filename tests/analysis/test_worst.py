@@ -106,6 +106,12 @@ def test_overloaded_antennas_are_ordered_by_their_load_and_tell_it() -> None:
     told_of = "overloaded: 4 of 8, 4 of them with all V-joints locked (samples 4, 5, 6, 7): "
     assert line.startswith(told_of)
     assert not any("ended before" in line for line in told(found))
+    # One whose latch has missed has not opened, though all V-joints came to 180 deg.
+    caught = np.array([36] * 5 + [35, 36, 36])
+    latched = made.assign(latched_joints=("sample", caught), locked_joints=("sample", [36] * 8))
+    assert outcome_table(analyse(latched, wanted)).notes == [note.format(3)]
+    (line,) = (each for each in outcome_lines(latched) if each.startswith("overloaded"))
+    assert line.startswith("overloaded: 4 of 8, 3 of them with all V-joints locked")
     made["deployment_time"][7] = np.nan
     assert outcome_table(analyse(made, wanted)).notes == [note.format(3)]
     assert any("1 of the 8 samples that meet it ended before" in line
@@ -152,7 +158,13 @@ def test_a_comparison_has_both_margins_to_the_limits_that_both_have() -> None:
         "limit", "worst value in first", "worst value in second", "margin in first",
         "margin in second",
     )  # fmt: skip
-    assert table.rows[0] == ("limits.tension = 30 N", "27 N", "40.5 N", "+0.111", "-0.259")
+    assert table.rows[0] == (
+        "limits.tension = 30 N",
+        "27 N",
+        "40.5 N",
+        "+0.111",
+        "-0.259: NOT enough",
+    )
     # Of two runs as of campaigns of one sample; each has the margin to its own limit.
     runs = [each.isel(sample=2, drop=True) for each in (first, second)]
     found = compare(*runs)
