@@ -114,6 +114,8 @@ class Fate(Code):
 
 GOALS = (Fate.DEPLOYED, Fate.FOLDED, Fate.FINISHED)
 """What runs are made for; the others ended before."""
+GO_ON = (Fate.OVERLOADED, Fate.SLACKENED)
+"""Of rings over a limit, which may open all the same."""
 AT_REST = (Fate.PARTLY_DEPLOYED, Fate.STALLED)
 """Of rings that came to rest before they were deployed."""
 

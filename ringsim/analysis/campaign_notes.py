@@ -59,7 +59,7 @@ from ringsim.tables import (
     readable,
     with_unit,
 )
-from ringsim.variables import AT_REST, Fate, Variable
+from ringsim.variables import AT_REST, GO_ON, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,7 +119,8 @@ def ending_lines(
             why = f"sample {own[0]}: {why}"
         told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
         told = "" if word in REACHED else told
-        if opened is not None and word == Fate.OVERLOADED.words and opened[own].any():
+        over = word in [each.words for each in GO_ON]
+        if opened is not None and over and opened[own].any():
             told = f", {int(opened[own].sum())} of them with all V-joints locked{told}"
         if word != UNKNOWN:
             lines.append(f"{word.removeprefix(LOST)}: {len(own)} of {run}{told}")

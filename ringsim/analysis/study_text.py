@@ -83,7 +83,7 @@ from ringsim.tables import (
     unit_behind,
     unit_text,
 )
-from ringsim.variables import Fate
+from ringsim.variables import GO_ON
 
 # Estimates for other distributions of inputs, as lines for people.
 
@@ -362,10 +362,12 @@ def outcome_table(analysis: xr.Dataset) -> Table:
         for one in [analysis.sel(kind=kind)]
     ]  # fmt: skip
     notes = []
-    if (over := Fate.OVERLOADED.words) in analysis["kind"].values and "outcome_open" in analysis:
-        count, opened = (int(analysis.sel(kind=over)[f"outcome_{n}"]) for n in ("samples", "open"))
-        told = f"of {counted(count, 'sample')} {over}, {opened} opened all the same"
-        notes += [f"{told}: all V-joints locked"] * bool(opened)
+    for over in (each.words for each in GO_ON) if "outcome_open" in analysis else ():
+        if over in analysis["kind"].values:
+            one = analysis.sel(kind=over)
+            count, opened = (int(one[f"outcome_{name}"]) for name in ("samples", "open"))
+            told = f"of {counted(count, 'sample')} {over}, {opened} opened all the same"
+            notes += [f"{told}: all V-joints locked"] * bool(opened)
     return Table(("outcome", "samples", "share", "95 % interval", *_parts()), rows, notes)
 
 

@@ -44,7 +44,7 @@ from ringsim.analysis.requirements import (
     violations,
 )
 from ringsim.tables import Table, bound_text, counted, number_text, with_unit
-from ringsim.variables import GOALS, Code, Fate, about, flags_of
+from ringsim.variables import GO_ON, GOALS, Code, Fate, about, flags_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -216,7 +216,7 @@ def _judged(
     off = used & (off | close)
     absent = used & (np.isnan(numbers(campaign, name)) if name != OUTCOME else False)
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
-    short = used & ~broken & _ended_short(campaign)
+    short = used & ~broken & ended_short(campaign)
     if name in _FINAL and "deployment_time" in campaign:  # then, whatever becomes of latches
         short &= ~np.isfinite(campaign["deployment_time"].to_numpy())
     place = campaign["sample"].to_numpy()
@@ -301,15 +301,15 @@ def verdict_text(one: Mapping[str, Any]) -> str:
     return f"{words}, {IF_HOLD}: may be off in {off} of {counted(one['samples_used'], 'sample')}"
 
 
-def _ended_short(campaign: xr.Dataset) -> Mask:
-    """Which runs ended before their goal: what they never came to cannot exceed a limit.  One that
-    is overloaded goes on, and has a time if it deploys all the same.
+def ended_short(campaign: xr.Dataset) -> Mask:
+    """Which runs ended before their goal: what they never came to cannot exceed a limit.  Those
+    over a limit of loads or slack go on, and may open all the same.
     """
     if OUTCOME not in campaign:
         return np.zeros(campaign.sizes["sample"], dtype=bool)
     fate = campaign[OUTCOME].to_numpy()
-    at_last = (fate == Fate.OVERLOADED) & opened(campaign)
-    return np.asarray(~np.isin(fate, [-1, Fate.NONE, *GOALS]) & ~at_last)
+    done = np.isin(fate, GO_ON) & opened(campaign)
+    return np.asarray(~np.isin(fate, [-1, Fate.NONE, *GOALS]) & ~done)
 
 
 def verdict_of(low: float, high: float, probability: float) -> Verdict:

@@ -34,7 +34,7 @@ from ringsim.outputs.balance import exceeded
 from ringsim.overrides import flat
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, with_unit
-from ringsim.variables import Fate, about
+from ringsim.variables import GO_ON, Fate, about
 
 # What is unusual in the inputs of a sample, in words.
 
@@ -296,8 +296,8 @@ def worst(
     ``worst_failure`` says what failed, with ``worst_failed`` samples of ``worst_of`` that ran; then
     ``worst_sample``, ``worst_found`` (its value, or why it ended) and ``worst_inputs``, what is
     unusual in its inputs.  Violations are ordered by their distance from the bound, those without
-    a value last; outcomes by the V-joints that locked, the fewest first; lost runs by how far they
-    came, the shortest first.  ``analysis`` is the ``influence`` of the campaign, whose inputs that
+    a value last; outcomes by the V-joints that locked, the fewest first, or by ``_beyond``; lost
+    runs by how far they came.  ``analysis`` is the ``influence`` of the campaign, whose inputs that
     separate a failure are named first.  InputError if a requirement cannot be judged.
     """
     for name, wanted in requirements.items():
@@ -328,13 +328,10 @@ def worst(
         "failure": (np.array(failures, dtype=object), {"long_name": "what failed"}),
         "failed": (np.array(failed), about("number of samples with this failure")),
         "of": (np.array(of), about("samples that have run")),
-        "sample": (campaign["sample"].to_numpy()[chosen], about(
-            "one of the worst of these samples")),
+        "sample": (campaign["sample"].to_numpy()[chosen], about("one of the worst of these")),
         "found": (np.array(found, dtype=object), {"long_name": "its value, or why the run ended"}),
-        "inputs": (
-            np.array(unusual(campaign, chosen, sides), dtype=object),
-            {"long_name": "its unusual inputs"},
-        ),
+        "inputs": (np.array(unusual(campaign, chosen, sides), dtype=object),
+                   {"long_name": "its unusual inputs"}),
     }  # fmt: skip
     return xr.Dataset({f"worst_{name}": ("worst", *each) for name, each in columns.items()})
 
@@ -390,13 +387,9 @@ def _failures(
         known = value and None in (wanted.max, wanted.min)
         found.append(_Failure(words, own, badness, value, wanted.min is None if known else None))
     ends, came = endings(campaign), -numbers(campaign, "final_time")
-    over = stuck
-    if (ends == Fate.OVERLOADED.word).any():  # reads all series
-        over = -np.fmin.reduce([ratio for *_, ratio in _ratios(campaign)] or [-stuck])
-    found += [
-        _Failure(word, ends == word, over if word == Fate.OVERLOADED.word else stuck, "")
-        for word in short_of_goal(ends)
-    ]
+    short = short_of_goal(ends)
+    beyond = {each.word: _beyond(campaign, each, stuck) for each in GO_ON if each.word in short}
+    found += [_Failure(word, ends == word, beyond.get(word, stuck), "") for word in short]
     kinds = [word for word in kinds_of_ends(ends) if word.startswith(LOST)]
     found += [_Failure(word, ends == word, came, "") for word in kinds]
     kept: dict[tuple[bytes, str], _Failure] = {}
@@ -407,6 +400,17 @@ def _failures(
             words=f"{before.words}; {each.words}"
         )  # fmt: skip
     return [*kept.values()]
+
+
+def _beyond(campaign: xr.Dataset, fate: Fate, stuck: Array) -> Array:
+    """How bad an end beyond a limit is: loads by how far they are beyond theirs, slack by the
+    joints that are ``stuck``, and its time.
+    """
+    ratios = {path: -ratio for path, *_, ratio in _ratios(campaign)}  # reads all series
+    slack = np.nan_to_num(ratios.pop(f"limits.{_SLACK[0]}", stuck), nan=-1.0)
+    if fate is Fate.OVERLOADED:
+        return np.asarray(np.fmax.reduce([*ratios.values()] or [stuck]))
+    return np.asarray(stuck + 0.5 * slack / (1.0 + np.abs(slack)))  # counts differ by 1
 
 
 def _found(campaign: xr.Dataset, name: str, place: int) -> str:

@@ -9,20 +9,27 @@ import difflib
 WORDS = {
     "chance": "what the largest of all inputs reaches in one output of 20 if none has any "
     "influence; the short tables list what is beyond it",
+    "better by": "by how much the objective of the first design is better than that of another "
+    "one, an interval of 95 %",
     "check": "a run of a sample by the other engine, too, beside which it is laid",
     "cut off": "outcome of a run: still moving, or driven, at solver.end_time",
     "clock": "offset and drift of a test's time against the run's, found with the unknowns",
+    "counted drive": "what drives at an angle, as the standard of the margin counts it",
     "deployed": "outcome of a run: every V-joint has come to 180 deg, and all latches hold",
     "dominates": "which error of a mean is the largest: of the draw, of steps and elements, or "
     "between the engines",
-    "drive margin": "what drives over all that resists, with its standard's factors, less 1; "
-    "where it is least it is the variable least_drive_margin",
+    "drive margin": "what drives over all that resists, with its standard's factors, less 1; where "
+    "it is least it is the variable least_drive_margin",
     "effect": "mu*, the mean absolute change of an output by a move of a group (Morris), in the "
     "output's unit",
     "effective samples": "how many plain samples of the other distribution the weighted ones are "
     "worth",
     "error bar": "how far the steps and elements of a run may put a number off, by a second run "
     "with steps half as long and twice the elements",
+    "failed runs": "samples whose run failed, so that nothing is known of the antenna; lower "
+    "bounds count them as violating",
+    "fan": "figure of how far each section is ahead of the mean opening angle or behind it, over "
+    "time and samples",
     "first-order index": "share of an output's variance that an input, or a group, explains by "
     "itself",
     "given-data index": "first-order index from bins of plain samples, corrected for chance",
@@ -35,8 +42,12 @@ WORDS = {
     "learnt": "what is left of an unknown's scatter, see remaining scatter",
     "met": "the samples show, at the confidence asked for, that the probability is as required",
     "not met": "the samples show, at the confidence asked for, that it is not",
-    "may be off": "samples in which the number is uncertain: steps at a lock were too long (?), or "
-    "the limit is closer than the numerical error",
+    "lock order": "figure of which V-joint locks first, second, ... and last, in how many samples",
+    "may be off": "samples in which the number is uncertain: steps at a lock were too long or "
+    "pulley friction was smoothed away (?), or the limit is closer than the numerical error",
+    "mechanism": "how many modes move a structure of rigid rods: nothing but inertia holds them",
+    "modal mass": "the mass that a natural mode moves, its shape 1 where it is largest",
+    "no population": "the samples were chosen, not drawn: there are no probabilities of antennas",
     "not latched": "outcome of a run: all V-joints came to 180 deg, and latches did not catch",
     "not explained": "the unknowns do not fit the data within their errors: the model, or an error "
     "that was given, is wrong",
@@ -55,7 +66,11 @@ WORDS = {
     "one grows or falls with the other, however bent",
     "remaining scatter": "the posterior's standard deviation over the prior's, of the normal "
     "variable behind the law: 1 where the data tell nothing",
+    "rms / sigma": "root mean square of measured less computed over the standard deviation of a "
+    "reading: about 1 where the run explains the data",
+    "samples beyond": "samples whose value is beyond the limit of the scene",
     "samples to go": "how many more samples, none of them violating, would show the requirement",
+    "samples used": "samples whose run holds and has a value of the output",
     "separation": "of all pairs of a sample in the group and one outside, the share in which the "
     "one in the group has the larger (or smaller) input; 50 % tells nothing",
     "set aside": "readings that do not fit, few enough to be left out: strays",
@@ -63,8 +78,8 @@ WORDS = {
     "slack": "a rope that is longer than its way and carries nothing but the little tension of "
     "slack_width",
     "slackened": "outcome of a run: a rope was slack for longer than the scene's limits allow",
-    "smoothed": "pulley friction that acts only in part, because the rope is slower than the "
-    "slip speed asks for",
+    "smoothed": "pulley friction that acts only in part, because the rope is slower than the slip "
+    "speed asks for",
     "stalled": "outcome of a run: at rest with no V-joint locked, and nothing drives it",
     "standard error": "how far a mean is off by the draw of the samples, as a standard deviation",
     "stray": "one of few readings that do not fit: it is set aside, and named",
@@ -73,8 +88,10 @@ WORDS = {
     "with others; what is near 0 may be left out",
     "violating": "samples that break the requirement, or have no value of its output",
     "worst sample": "the one whose output is farthest to the side that is bad for an antenna",
-    "?": "runs call the number uncertain themselves, because their steps at locks were too long; "
-    "a line tells the tolerance that cures it",
+    "worst of": "the samples in which a requirement or an outcome is missed by most, the worst "
+    "first",
+    "?": "runs call the number uncertain themselves, because their steps at locks were too long, "
+    "or their pulley friction was smoothed away; a line tells what cures it",
     "*": "runs that failed depend on inputs: the others, of which the number is, are another "
     "population",
 }

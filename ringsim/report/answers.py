@@ -14,11 +14,10 @@ from ringsim.analysis import campaign_notes as notes
 from ringsim.analysis.intervals import good, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.study_text import outcome_table, unit_of
-from ringsim.analysis.verdicts import BOUND, SHARE_MET, verdict_table
+from ringsim.analysis.verdicts import BOUND, SHARE_MET, ended_short, verdict_table
 from ringsim.refusal import show
 from ringsim.report.page import drawn_inputs
 from ringsim.tables import Table, counted, number_text, with_unit
-from ringsim.variables import GOALS, Fate
 
 
 class Of(NamedTuple):
@@ -142,7 +141,7 @@ def evidence_of(of: Of, name: str) -> str:
                        "samples with bars": str(np.count_nonzero(bars))}  # fmt: skip
     if OUTCOME in campaign and len(campaign[OUTCOME]) == used + lost + absent:
         valued = good(campaign) & np.isfinite(numbers(campaign, name))
-        short = int((valued & ~np.isin(campaign[OUTCOME], [-1, Fate.NONE, *GOALS])).sum())
+        short = int((valued & ended_short(campaign)).sum())
         words[0] += f", {short} of them as they ended, not deployed" * bool(short)
     for most, count, told in (
         ("largest bar", "samples with bars", "error bar"),

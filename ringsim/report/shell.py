@@ -37,7 +37,7 @@ def written(
 
     They are lines as long as the page stays below ``LARGEST`` with them, then pictures.
     """
-    shape, text = _shell().get_template(template), ""
+    shape, text = templates().get_template(template), ""
     each = [(name, words, Inline(figure, name, words)) for name, words, figure in drawn]
     for heavy in (HEAVY, HEAVY // 4, 0):
         figures = {name: (name, words, one.element(heavy)) for name, words, one in each}
@@ -119,14 +119,14 @@ class _Sheets:
 
 
 @functools.cache
-def _shell() -> jinja2.Environment:
+def templates() -> jinja2.Environment:
     """What templates are read by, which it compiles once."""
-    shell = jinja2.Environment(
+    found = jinja2.Environment(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    shell.filters |= {"sentence": _sentence, "head": _head, "parted": _parted}
-    return shell
+    found.filters |= {"sentence": _sentence, "head": _head, "parted": _parted}
+    return found
 
 
 def _sentence(line: str) -> str:

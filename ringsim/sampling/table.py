@@ -179,7 +179,7 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
         # A value that nobody has written; a path that is none is at fault with any.
         at_fault = "is not a known key", "there is no value", "leave out each_section"
         if isinstance(middle, float) and not any(words in str(error) for words in at_fault):
-            told = f"inputs: {name}: {show(middle)} is the median of what is drawn for it"
+            told = f"inputs: {name}: {show(middle)} is among what is drawn for it"
             raise InputError(f"{told}, and {error}") from None
         raise InputError(f"inputs: {error}") from None
     if len(set(counts.values())) > 1:

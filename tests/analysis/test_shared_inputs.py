@@ -115,5 +115,8 @@ def test_a_comparison_names_it_once() -> None:
         each["sample_seed"] = "sample", np.arange(30)
         each.attrs["design"] = json.dumps({"kind": "random", "samples": 30})
     for path in PATHS:
-        other[path.replace(".", "_")][:] = 0.5
+        name = path.replace(".", "_")
+        other[name][:] = 0.5
+        law = json.loads(other[name].attrs["distribution"])
+        other[name].attrs["distribution"] = json.dumps(law | {"kind": "uniform", "low": 0.2})
     assert compare(one, other).attrs["pairing"].endswith("their inputs differ in cold")

@@ -118,6 +118,28 @@ def test_overloaded_antennas_are_ordered_by_their_load_and_tell_it() -> None:
                for line in told(analyse(made, wanted)))  # fmt: skip
 
 
+def test_rings_over_a_limit_of_slack_are_ordered_by_it_and_may_open_all_the_same() -> None:
+    """Samples 1 and 4 to 7 of 8 were slack for too long, and 1 has not opened; overloads are not
+    ordered by slack."""
+    slack = np.array([0.0, 2.0, 0.0, 0.5, 9.0, 11.0, 8.0, 10.0])
+    made = made_campaign(8, stalled=(1,)).assign(longest_slack=("sample", slack))
+    made["locked_joints"] = "sample", np.where(np.arange(8) == 1, 12, 36)
+    made = with_limits(made, slack_duration=1.0, tension=21.0)
+    fate = made["outcome"].to_numpy().copy()
+    fate[slack > 1.0], fate[[2, 3]] = int(Fate.SLACKENED), int(Fate.OVERLOADED)
+    made["outcome"] = "sample", fate
+    wanted = {"asynchrony_max": {"max": 90.0, **BOUND}}
+    found = analyse(made, wanted)
+    of = {each.title.split(" (")[0]: each for each in worst_tables(found, "f")}
+    assert [row[0] for row in of["slackened"].rows] == ["1", "5", "7"]
+    assert [row[0] for row in of["overloaded"].rows] == ["3", "2"]
+    assert outcome_table(found).notes == [
+        "of 2 samples overloaded, 2 opened all the same: all V-joints locked",
+        "of 5 samples slackened, 4 opened all the same: all V-joints locked",
+    ]
+    assert any("1 of the 8 samples that meet it ended before" in line for line in told(found))
+
+
 def test_ropes_that_never_were_slack_count_as_within_the_limit() -> None:
     slack = np.zeros(8)
     slack[[2, 5]] = 3.0, 0.5

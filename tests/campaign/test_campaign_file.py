@@ -123,7 +123,7 @@ def test_a_refused_median_is_told_as_what_it_is(tmp_path):
     speed = '[inputs]\n"cables.upper.winch.winding.speed" = '
     with pytest.raises(InputError) as refused:
         loaded(tmp_path, f'{head}{speed}{{ kind = "uniform", low = 380.0, high = 820.0 }}\n').draw()
-    assert "speed: 600.0 is the median of what is drawn for it, and scene" in str(refused.value)
+    assert "speed: 600.0 is among what is drawn for it, and scene" in str(refused.value)
     assert "speed = 600.0 rad/s must be below" in str(refused.value)
 
 

@@ -179,6 +179,19 @@ def test_a_duration_is_not_shifted_by_the_offset_of_the_clock(
     assert one.values == pytest.approx([2.0])
 
 
+def test_a_reading_at_the_last_record_is_compared_whatever_digits_the_clock_leaves(
+    run: xr.Dataset, tmp_path: Path
+) -> None:
+    """0.5 s + 1.001 of the file's time: some digits beyond the last record, and a thousandth."""
+    end = float(run["time"].values[np.isfinite(run["cable_tension"].sel(plane="lower")[0])][-1])
+    rows = table(run)
+    for late, outside in ((1e-15, 0), (1e-3, 1)):
+        last = [repr(1e3 * (end * (1.0 + late) - 0.5) / 1.001), *rows[1][1:]]
+        file = load_measured(written(tmp_path, HEAD + CELL, [*rows[:5], last]))
+        (cell,) = residuals(run, file)
+        assert cell.outside == outside
+
+
 def test_what_a_run_never_came_to_is_not_compared(run: xr.Dataset, tmp_path: Path) -> None:
     file = load_measured(written(tmp_path, HEAD + LOCK + ENCODER, table(run)))
     lock, encoder = residuals(run.assign(lock_time=run["lock_time"] * np.nan), file)

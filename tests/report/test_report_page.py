@@ -644,3 +644,15 @@ def test_long_heads_may_be_broken_at_underscores() -> None:
     campaign = made_campaign(4)
     campaign.attrs["design"] = json.dumps({"kind": "one-at-a-time"})
     assert '<th scope="col">asynchrony_<wbr>max (deg)</th>' in page(campaign, "runs/made")
+
+
+@pytest.mark.quick
+def test_long_cells_are_broken_though_they_hold_a_range() -> None:
+    """A posterior's law ran over the columns beside it in print."""
+    law = (
+        "median 1.3, 90 % in 1.2 .. 1.4 after a test (before: normal, mean 1, standard deviation 1)"
+    )
+    macros = shell.templates().get_template("macros.html.j2").module
+    told = str(macros.table(["a", "b"], [("1.2 .. 1.4", law)], "t"))  # type: ignore[attr-defined]
+    assert '<td class="range">1.2 .. 1.4</td>' in told
+    assert '<td class="long">median' in told
