@@ -103,7 +103,7 @@ def load_cases(runs: Path) -> Figure:
                           fontsize=9, bbox=style.PAPER)  # fmt: skip
     angles.axhline(180.0, color=style.GREY, linewidth=0.8, zorder=1.4)
     angles.set(xlim=(0.0, 18.5), ylim=(40.0, 184.0), xlabel="Time (s)",
-               ylabel="Angle between the bars\nof section 1 (degree)")  # fmt: skip
+               ylabel="Angle between the bars\nof section 1 (deg)")  # fmt: skip
     angles.set_yticks(range(60, 181, 30))
     angles.legend(loc="upper left")
     angles.get_legend().legend_handles[-1].set_color(style.GREY)

@@ -1,8 +1,9 @@
-"""Draws the pictures of docs/evidence/studies that are not figures of one campaign alone.
+"""Draws the pictures of docs/evidence/studies whose campaigns are there.
 
     python docs/study_pictures.py runs
 
-``winding_laws.png`` from runs/winding-laws, ``sections.png`` from runs/sections-N;
+Those of ``OF_ONE`` are figures of one campaign.  Of others: ``winding_laws.png`` from
+runs/winding-laws, ``sections.png`` from runs/sections-N;
 ``stalling_motor.png`` from runs/stalling-motor and runs/stalling-motor-ground: the margin of the
 rigid ring without a standard's factors, against what the flexible one did, and ground over flight;
 ``rare_asynchrony.png`` from runs/rare-asynchrony and runs/plain, of which it prints the table, too.
@@ -22,6 +23,7 @@ from ringsim.analysis.intervals import good, share_interval
 from ringsim.analysis.tails import replicated_interval, subset_simulation
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import LOOKS
+from ringsim.plots.figures import figures_of
 from ringsim.rigid.drive import Drive
 from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.resistances import Opening, resistances
@@ -33,7 +35,7 @@ NEVER = 66.0
 """Where rings stand that are not deployed at the end, s."""
 COUNTS = (6, 9, 12, 18, 27, 36)
 NUMBERS = {
-    "asynchrony_max": "Largest asynchrony (degree)",
+    "asynchrony_max": "Largest asynchrony (deg)",
     "deployment_time": "Deployment time (s)",
     "peak_tension": "Largest tension (N)",
 }
@@ -71,7 +73,7 @@ def winding_laws(runs: Path) -> Figure:
         grid = {
             "Largest tension (N)": campaign["peak_tension"].to_numpy(),
             "Slack at the winch, worse cable (s)": campaign["slack_duration"].max("plane"),
-            "Largest asynchrony (degree)": campaign["asynchrony_max"].to_numpy(),
+            "Largest asynchrony (deg)": campaign["asynchrony_max"].to_numpy(),
         }
         joints = campaign["joints_vjoint_viscous"].to_numpy().reshape(-1, len(LAWS))[:, 0]
     figure = Figure(figsize=(10.4, 3.9))
@@ -257,17 +259,39 @@ def rare_asynchrony(runs: Path) -> Figure:
         axes.errorbar(limit, each.mean(), [[each.mean() - low], [high - each.mean()]], capsize=3,
                       color=style.VERMILION, marker="s", markersize=4, linestyle="none",
                       elinewidth=1.0, label=label)  # fmt: skip
-    axes.set(yscale="log", xlabel="Largest asynchrony (degree)", ylabel="Probability of more")
+    axes.set(yscale="log", xlabel="Largest asynchrony (deg)", ylabel="Probability of more")
     axes.set(xlim=(2.5, 5.6), ylim=(1e-6, 1.0))
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
+OF_ONE = {
+    "bad_bearing": ("bad-bearing", "one_by_one"),
+    "second_motor": ("second-motor", "one_by_one"),
+    "length_scatter": ("length-errors", "distributions"),
+    "friction_scatter_fan": ("nonsync-friction", "fan"),
+    "friction_scatter_matters": ("nonsync-friction", "tornado"),
+    "stalling_motor_margin": ("stalling-motor", "margin"),
+}
+"""By picture its campaign and which of that one's figures it is."""
+OF_MANY = {
+    winding_laws: ["winding-laws"], sections: [f"sections-{n}" for n in COUNTS],
+    stalling_motor: ["stalling-motor", "stalling-motor-ground"],
+    rare_asynchrony: ["rare-asynchrony", "plain"],
+}  # fmt: skip
+
+
 def main() -> None:
-    """Draw all of them."""
+    """Draw all of them for which there are runs."""
     runs = Path(sys.argv[1])
-    for draw in (winding_laws, sections, stalling_motor, rare_asynchrony):
-        save(draw(runs), f"{draw.__name__}.png")
+    for name, (campaign, figure) in OF_ONE.items():
+        if (file := runs / campaign / "campaign.nc").exists():
+            with xr.open_dataset(file) as found:
+                for _, drawn in figures_of(found, figure):
+                    save(drawn, f"{name}.png")
+    for draw, needs in OF_MANY.items():
+        if all((runs / campaign / "campaign.nc").exists() for campaign in needs):
+            save(draw(runs), f"{draw.__name__}.png")
 
 
 if __name__ == "__main__":
