@@ -460,6 +460,12 @@ def test_one_at_a_time_names_every_change() -> None:
     names = {picture.name for picture, _ in figures_of(campaign)}
     assert "one_by_one" in names
     assert not {"distributions", "convergence", "tornado"} & names
+    # Long names take their room below the panels, not from them.
+    campaign["cables_lower_winch_stop_time"][:] = ["none"] * 5 + ["a winch that is cut off " * 9]
+    figure = one_by_one(campaign)
+    figure.draw_without_rendering()
+    heights = [axes.get_window_extent().height / figure.dpi for axes in figure.axes]
+    assert min(heights) > 0.8
 
 
 def test_panels_are_for_numbers_that_differ_or_have_limits() -> None:

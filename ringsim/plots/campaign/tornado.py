@@ -414,8 +414,8 @@ _MOST_NAMED = 72
 _MOST_MOVED, _FEW_MOVES, _LOW_SHEET = 18, 24, 6
 """Panels of a sheet; moves that half its width can name, and panels up to which it needs no two
 columns."""
-_ROOM = 0.8
-"""Share of a figure's width that panels have."""
+_ROOM, _LETTER = 0.8, 0.07
+"""Share of a figure's width that panels have; length of a letter below them, inch."""
 _LEAST_SPAN = 0.02
 """Of its largest value: axes of smaller ranges are made to span twice as much."""
 
@@ -451,9 +451,18 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     (names, others), ends = shown(campaign, _MOST_MOVED), endings(campaign)
     words, moved = moves(campaign)
     samples, has_run = campaign["sample"].to_numpy(), ran(campaign)
-    columns = 2 if len(samples) <= _FEW_MOVES and len(names) > _LOW_SHEET else 1
+    places, few = named(len(samples)), len(samples) <= _FEW_MOVES
+    columns = 2 if few and len(names) > _LOW_SHEET else 1
+    # As many lines as find room between two marks.
+    most = min(3, max(1, int(_ROOM * 9.6 / columns / len(samples) / _LINE)))
+    wrapped = partial(textwrap.fill, width=52 - 8 * most, max_lines=most, placeholder=" ...")
+    fit = wrapped if few else short
+    names_shown = [fit(words[k]) for k in places]
+    # Below both columns, of which the second may end a row before the first.
+    below = _LETTER * max(len(line) for each in names_shown for line in each.splitlines())
+    below *= 1 + len(names) % columns
     figure, panels, columns = style.new_panels(
-        len(names), 9.6 / columns, 1.5, 2.4, sharex=True, most=columns
+        len(names), 9.6 / columns, 1.5, 1.6 + below, sharex=True, most=columns
     )
     looks = looks_of(ends)
     for axes, name in zip(panels, names, strict=True):
@@ -479,13 +488,6 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         axes.set_title(style.label(campaign[name], width=120 // columns), fontsize=9.5)
-    places = named(len(samples))
-    few = len(samples) <= _FEW_MOVES
-    # As many lines as find room between two marks.
-    most = min(3, max(1, int(_ROOM * 9.6 / columns / len(samples) / _LINE)))
-    wrapped = partial(textwrap.fill, width=52 - 8 * most, max_lines=most, placeholder=" ...")
-    fit = wrapped if few else short
-    names_shown = [fit(words[k]) for k in places]
     for axes in panels[-columns:]:
         axes.set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
         axes.tick_params(axis="x", labelbottom=True)
