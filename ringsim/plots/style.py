@@ -524,8 +524,8 @@ _FAR_ABOVE = 4.0
 """Limit over the upper end of an axis from which on it is named and not drawn."""
 
 
-def draw_limit(axes: Axes, limit: float, words: str) -> None:
-    """A dashed line at a limit, with its name at its left end; nothing at NaN.
+def draw_limit(axes: Axes, limit: float, words: str, right: bool = False) -> None:
+    """A dashed line at a limit, with its name at its left end, or its ``right``; nothing at NaN.
 
     Of one that is far above what was drawn before the name alone: its line would leave curves a
     strip at the foot.
@@ -537,8 +537,9 @@ def draw_limit(axes: Axes, limit: float, words: str) -> None:
                       xycoords="axes fraction", textcoords="offset points", fontsize=9)  # fmt: skip
         return
     axes.axhline(limit, color=VERMILION, linewidth=1.2, linestyle=(0, (5, 2)))
-    axes.annotate(words, (0.0, limit), xytext=(4, 2), xycoords=axes.get_yaxis_transform(),
-                  textcoords="offset points", color=VERMILION, fontsize=9)  # fmt: skip
+    axes.annotate(words, (float(right), limit), xytext=(4 - 8 * right, 2),
+                  xycoords=axes.get_yaxis_transform(), textcoords="offset points", fontsize=9,
+                  color=VERMILION, ha="right" if right else "left")  # fmt: skip
 
 
 _MOST_MARGIN = 1e3

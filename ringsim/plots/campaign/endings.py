@@ -409,7 +409,7 @@ def tension(campaign: xr.Dataset) -> Figure:
         style.draw_limit(axes, limit, f"limits.tension = {limit:g} N{also}")
         for word, most in required:
             if most != limit:
-                style.draw_limit(axes, most, f"required: {word} {most:g} N")
+                style.draw_limit(axes, most, f"required: {word} {most:g} N", right=True)
         axes.set_title(f"{plane} cable", fontsize=9.5)
         axes.xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
     style.from_zero(grid[0])  # all panels share it
