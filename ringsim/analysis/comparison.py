@@ -453,7 +453,11 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
         "sample_seed",
     )
     grows, alike = subset_simulation(first.attrs) is not None, designs[0] == designs[1]
-    why = f"neither their {'seeds' if alike else 'designs'} nor their inputs are equal"
+    unlike = (
+        f", because neither their {'seeds' if alike else 'designs'} nor their inputs are equal; "
+        "pairs show smaller differences: give both campaigns the same seed, design and number of "
+        "samples"
+    )
     if alike and not grows and seeds in first and seeds in second:
         keys = [list(each[seeds].to_numpy().tolist()) for each in (first, second)]
         if (found := _matched(*keys))[0].size:
@@ -461,10 +465,10 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
             if not moved:
                 told = f"; their inputs differ in {', '.join(other)}" * bool(other)
                 return Pairs(*found, f"samples are paired by their seeds{told}")
-            why = (
-                f"with equal seeds and distributions {', '.join(moved)} have other values, since "
-                "other inputs have moved their draws (in random designs inputs behind them do not: "
-                "put those with each_section, and further ones, last)"
+            unlike = (
+                f": their seeds are equal, but {', '.join(moved)} have other values, since inputs "
+                "before them, or places of these, are more or fewer; pairs show smaller differences"
+                ": in a random design put inputs with each_section last, and further ones behind"
             )
     rows = [_rows(each, inputs) for each in (first, second)]
     if inputs and all(len(set(each)) == len(each) for each in rows):
@@ -472,11 +476,7 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
         if found[0].size:
             return Pairs(*found, "samples are paired by their inputs")
     none = np.zeros(0, dtype=np.int64)
-    return Pairs(
-        none, none,
-        f"samples are not paired, because {why}; pairs show smaller differences: give both "
-        "campaigns the same seed, design, number of samples and inputs",
-    )  # fmt: skip
+    return Pairs(none, none, f"samples are not paired{unlike}")
 
 
 def _unlike(both: Both, known: list[str], pairs: Places) -> tuple[list[str], list[str]]:
