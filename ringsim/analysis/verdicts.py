@@ -359,7 +359,7 @@ def _together_told(analysis: xr.Dataset, count: int) -> str:
     """How many samples keep to all requirements."""
     names = ("samples", "of", "probability_lower", "probability_upper", "confidence")
     kept, run, least, most, sure = (float(analysis[f"together_{name}"]) for name in names)
-    told = f"all {count} requirements together: {kept:.0f} of {run:.0f} samples meet them"
+    told = f"{'both' if count == 2 else f'all {count}'} requirements together: {kept:.0f} of {run:.0f} samples meet them"
     # Of few that meet them all the upper bound says more, and of none the lower one nothing.
     upper = 2.0 * kept < run
     if failed := int(analysis["together_lost"]):

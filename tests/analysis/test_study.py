@@ -189,7 +189,7 @@ def test_all_requirements_together_are_counted_with_the_bound_of_what_keeps_to_a
     assert int(found.together_of) == 40
     least = scipy.stats.beta.ppf(0.05, kept, 40 - kept + 1)
     assert float(found.together_probability_lower) == pytest.approx(least)
-    line = f"all 2 requirements together: {kept} of 40 samples meet them (1 failed run counted as "
+    line = f"both requirements together: {kept} of 40 samples meet them (1 failed run counted as "
     line += "not meeting them), a probability of at least"
     assert any(note.startswith(line) for note in verdict_table(found).notes)
     few = analyse(
@@ -197,7 +197,7 @@ def test_all_requirements_together_are_counted_with_the_bound_of_what_keeps_to_a
     )
     most = scipy.stats.beta.ppf(0.95, 2, 39)  # the failed run may have met them
     assert float(few.together_probability_upper) == pytest.approx(most)
-    line = "all 2 requirements together: 0 of 40 samples meet them (1 failed run that may have met "
+    line = "both requirements together: 0 of 40 samples meet them (1 failed run that may have met "
     line += f"them), a probability of at most {bound_text(most, upper=True)} (confidence"
     assert any(note.startswith(line) for note in verdict_table(few).notes)
     # Where looks share the error, so does the bound of all: no more than that of any.
