@@ -355,11 +355,11 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
     return told
 
 
-def _together_told(analysis: xr.Dataset, count: int) -> str:
+def _together_told(analysis: xr.Dataset, every: str) -> str:
     """How many samples keep to all requirements."""
     names = ("samples", "of", "probability_lower", "probability_upper", "confidence")
     kept, run, least, most, sure = (float(analysis[f"together_{name}"]) for name in names)
-    told = f"{'both' if count == 2 else f'all {count}'} requirements together: {kept:.0f} of {run:.0f} samples meet them"
+    told = f"{every} requirements together: {kept:.0f} of {run:.0f} samples meet them"
     # Of few that meet them all the upper bound says more, and of none the lower one nothing.
     upper = 2.0 * kept < run
     if failed := int(analysis["together_lost"]):
@@ -443,7 +443,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         for (most, level), names in never.items()
     ] + notes
     if "together_of" in analysis and rows:
-        notes.insert(0, _together_told(analysis, len(rows)))
+        notes.insert(0, _together_told(analysis, "both" if len(rows) == 2 else f"all {len(rows)}"))
     if rows:
         notes.insert(0, _CHOSEN if chosen else _DECIDES)
     head = (
