@@ -311,14 +311,11 @@ def compare(first: xr.Dataset, second: xr.Dataset, names: tuple[str, str] = SIDE
 
 def _doubtful(both: Both) -> dict[str, Any]:
     """Of each output of which a run says that it may be off, in how many samples of both."""
-    counts = [
-        Counter(
-            name for reason in np.atleast_1d(each.get("reason", each.attrs.get("reason", "")))
-            for name in may_be_off(str(reason))[0]
-        )
-        for each in both
-    ]  # fmt: skip
-    words = about("samples whose run says that it may be off")
+    reasons = [np.atleast_1d(one.get("reason", one.attrs.get("reason", ""))) for one in both]
+    doubts = [[may_be_off(str(reason)) for reason in own] for own in reasons]
+    counts = [Counter(name for names, _ in own for name in names) for own in doubts]
+    causes = dict.fromkeys(cause for own in doubts for _, cures in own for cause in cures)
+    words = about("samples whose run says that it may be off") | {"since": " or ".join(causes)}
     return {
         f"{name}_doubtful": ("side", np.array([each[name] for each in counts]), words)
         for name in dict.fromkeys([*counts[0], *counts[1]])

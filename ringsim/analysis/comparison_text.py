@@ -113,10 +113,8 @@ def _doubts(found: xr.Dataset) -> Iterator[str]:
             )
         told.append(f"{', '.join(outputs)} in {where}")
     if told:
-        yield (
-            f"numbers with{DOUBT} may be off, as their runs say, because steps were too long "
-            f"at locks: {'; '.join(told)}"
-        )
+        since = found[f"{next(iter(doubtful(found)))}{_COUNTED}"].attrs["since"]
+        yield f"numbers with{DOUBT} may be off, as their runs say, since {since}: {'; '.join(told)}"
 
 
 def _questioned(table: Table, found: xr.Dataset) -> Table:

@@ -74,6 +74,11 @@ def test_what_may_be_off_is_told_with_verdicts_and_figures(
         words = {row[0]: row[1] for row in verdict_table(analyse(each)).rows}
         texts = found["requirement"].values
         assert found["kept_verdict_text"].values[:, side].tolist() == [words[t] for t in texts]
+    (line,) = (each for each in compared(found) if each.startswith("numbers with ?"))
+    assert line.startswith(
+        "numbers with ? may be off, as their runs say, since steps are too long at locks: "
+        "asynchrony_max in 8 of 8"
+    )
     (table, *_) = sections(found)["requirements"].tables
     told = {row[0]: row[-2:] for row in table.rows}
     assert "if its numbers hold: may be off in 8 of 8" in told["asynchrony_max <= 3 deg ?"][0]
