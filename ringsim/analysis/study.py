@@ -65,6 +65,7 @@ from ringsim.analysis.sensitivity import rarer, sensitivity
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge
 from ringsim.analysis.worst import (
+    labels,
     margins,
     one_at_a_time,
     other_than_base,
@@ -164,7 +165,7 @@ def analyse(
     found = found.assign(balance(campaign))
     single = one_at_a_time(campaign)  # what each change does is told case by case
     matter = xr.Dataset() if single else influence(stand, wanted, placed)
-    more = [outcomes(stand, placed), matter, *([cases(campaign)] if single else [])]
+    more = [outcomes(stand, placed), matter, cases(campaign)]
     more += [worst(stand, wanted, matter), margins(campaign)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed), rarer(stand, wanted, placed)]
@@ -182,21 +183,25 @@ def analyse(
 
 
 def cases(campaign: xr.Dataset) -> xr.Dataset:
-    """Of a design that changes one input at a time, along ``case``: the sample, what is other than
-    in the base case, how it ended, and the main numbers, ``case_NAME``.
+    """Of a design that changes one input at a time, or lists cases by name, along ``case``: the
+    sample, what is other than in the base case, or its name, how it ended, and the main numbers,
+    ``case_NAME``; of any other no variables.
     """
-    held = np.flatnonzero(ran(campaign))
+    held, says = np.flatnonzero(ran(campaign)), "what is other than in the base case"
+    if one_at_a_time(campaign):
+        names = [other_than_base(campaign, k) for k in held.tolist()]
+    elif placement(campaign).kind == "list" and (own := labels(campaign)):
+        names, says = [", ".join(str(v.values[k]) for v in own) for k in held.tolist()], "case"
+    else:
+        return xr.Dataset()
     named = scalars(campaign)
     about_cases = {
         "case_sample": (campaign["sample"].to_numpy()[held], "sample"),
-        "case_change": (
-            np.array([other_than_base(campaign, k) for k in held.tolist()], dtype=object),
-            "what is other than in the base case",
-        ),
+        "case_change": (np.array(names, dtype=object), says),
         "case_outcome": (endings(campaign)[held].astype(object), "how the sample ended"),
     }
-    found = {name: ("case", values, {"long_name": says})
-             for name, (values, says) in about_cases.items()}  # fmt: skip
+    found = {name: ("case", values, {"long_name": meant})
+             for name, (values, meant) in about_cases.items()}  # fmt: skip
     ok = good(campaign)[held]
     for name in named:
         values = np.where(ok, numbers(campaign, name)[held], np.nan)

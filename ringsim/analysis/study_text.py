@@ -202,7 +202,8 @@ def sections(
     }
     short = [what_matters(analysis), *refusals(analysis), separated, changing]
     if "case" in analysis.dims:
-        short = [case_table(analysis)]
+        single = analysis.attrs.get("design") == "one-at-a-time"
+        short = [case_table(analysis), *([] if single else short)]
     more = _at_length(analysis) if full else {}
     numbers, event, limits = (
         statistics_table(analysis), tail_table(analysis), margin_table(analysis)
@@ -243,7 +244,7 @@ def sections(
 
 
 def case_table(analysis: xr.Dataset) -> Table:
-    """Of a design that changes one input at a time a row a case, the base case first."""
+    """Of a design that changes one input at a time, or lists cases by name, a row a case."""
     told = "case_sample", "case_change", "case_outcome"
     names = [str(name) for name in analysis if str(name).startswith("case_") and name not in told]
     units = [unit_of(analysis, name) for name in names]
@@ -258,7 +259,10 @@ def case_table(analysis: xr.Dataset) -> Table:
     ]  # fmt: skip
     heads = [unit_behind(n.removeprefix("case_"), unit or "1")
              for n, (_, unit) in zip(names, units, strict=True)]  # fmt: skip
-    return Table(("sample", "other than the base case", "outcome", *heads), rows, left=3)
+    change = str(analysis["case_change"].attrs["long_name"]).replace(
+        "what is other than in", "other than"
+    )
+    return Table(("sample", change, "outcome", *heads), rows, left=3)
 
 
 def _at_length(analysis: xr.Dataset) -> dict[str, list[Table]]:

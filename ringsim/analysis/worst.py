@@ -91,9 +91,9 @@ def unusual(
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
     listed, grid = (placement(campaign).kind == kind for kind in ("list", "grid"))
-    labels, usual = (_labels(campaign), _usual(campaign)) if listed else ([], [])
+    names, usual = (labels(campaign), _usual(campaign)) if listed else ([], [])
     for place, sides in zip(places, separating or [{}] * len(places), strict=True):
-        told, named = [str(each.values[place]) for each in labels], set[str]()
+        told, named = [str(each.values[place]) for each in names], set[str]()
         for name, variable, column, most in usual:
             if column[place] != most:
                 new, common = (_value(each, _units(variable)) for each in (column[place], most))
@@ -142,7 +142,7 @@ def _chosen(campaign: xr.Dataset, place: int) -> list[str]:
     return told
 
 
-def _labels(campaign: xr.Dataset) -> list[xr.DataArray]:
+def labels(campaign: xr.Dataset) -> list[xr.DataArray]:
     """Of a list of cases the texts that tell them apart."""
     return [
         campaign[name] for name, v in campaign.variables.items()
@@ -458,7 +458,7 @@ def note_on_unusual(analysis: xr.Dataset) -> str:
     """What "unusual inputs" are; empty where samples differ from a base case by one change each."""
     if analysis.attrs.get("design") == "grid":
         return f"{_NOTE_ON_UNUSUAL}; where none is, those at the ends of the grid"
-    return "" if "case" in analysis.dims else _NOTE_ON_UNUSUAL
+    return "" if analysis.attrs.get("design") == "one-at-a-time" else _NOTE_ON_UNUSUAL
 
 
 def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:

@@ -338,11 +338,11 @@ def _faults(of: Of) -> Answer:
     failed = drawn_lines(of, lambda path, _: path.startswith("faults") or "stop_time" in path)
     found = Answer([*failed, *drawn_lines(of, late)])
     found.result += notes.reached_by_words(of.campaign, "faults")
-    if "case" in of.analysis.dims:
+    if single := one_at_a_time(of.campaign):
         ends = Counter(of.analysis["case_outcome"].values.tolist())
         told = ", ".join(f"{count} {end}" for end, count in ends.items())
         found.result.append(f"{counted(sum(ends.values()), 'case')} of one change each: {told}")
-    if not failed and "case" not in of.analysis.dims:  # a late start is no failed part
+    if not failed and not single:  # a late start is no failed part
         found.lacks["failures"] = 'draw faults under [inputs], or design.kind = "one-at-a-time"'
     return found
 

@@ -9,6 +9,7 @@ from made_campaign import made_campaign
 
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import case_table, told
+from ringsim.plots.campaign.frame import looks_of_cases
 
 pytestmark = pytest.mark.quick
 
@@ -63,3 +64,19 @@ def test_what_is_the_same_in_all_cases_has_its_value(campaign: xr.Dataset) -> No
     campaign["peak_tension"][:] = 40.0
     (line,) = (each for each in told(analyse(campaign)) if each.startswith("the same in all"))
     assert "peak_tension 40 N" in line
+
+
+def test_cases_of_a_list_are_told_by_their_names(campaign: xr.Dataset) -> None:
+    """In a table, and in figures that draw each of them; a list without names has neither."""
+    listed = campaign.assign_attrs(design='{"kind": "list", "file": "cases.csv"}')
+    assert "case" not in analyse(listed).dims
+    names = np.array(["sound", "soft", "jam", "late", "cold", "stops"], dtype=object)
+    listed["load_case"] = "sample", names, {"role": "label", "path": ""}
+    table = case_table(analyse(listed))
+    assert table.head[:3] == ("sample", "case", "outcome")
+    assert [row[:3] for row in table.rows] == [
+        (str(k), name, "stalled" if k == 5 else "deployed") for k, name in enumerate(names)
+    ]
+    assert [row for row in told(analyse(listed)) if row.startswith("5 ")]
+    looks = looks_of_cases(listed, np.array([1, 5]))
+    assert [each["label"] for each in looks] == ["soft (deployed)", "stops (stalled)"]

@@ -44,7 +44,7 @@ from ringsim.analysis.intervals import (
     varies,
 )
 from ringsim.analysis.requirements import required_by, without_twins
-from ringsim.analysis.worst import one_at_a_time
+from ringsim.analysis.worst import labels, one_at_a_time
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.base import DOUBT
 from ringsim.outputs.family import VARIABLES, Array
@@ -359,13 +359,16 @@ def looks_of_cases(campaign: xr.Dataset, samples: NDArray[np.int64]) -> list[dic
     ends, base, few = endings(campaign)[at], base_of(campaign), len(samples) <= _FEW
     shown, own, found = looks_of(ends), itertools.cycle(_OWN), list[dict[str, Any]]()
     single = one_at_a_time(campaign)
-    words = moves(campaign)[0] if few and single else [""] * campaign.sizes["sample"]
+    every = campaign["sample"].values.tolist()
+    told = zip(*(v.values for v in labels(campaign)), strict=True)
+    names = [", ".join(map(str, own)) for own in told]
+    words = moves(campaign)[0] if few and single else names or [f"sample {k}" for k in every]
     for place, sample, end in zip(at.tolist(), samples.tolist(), ends.tolist(), strict=True):
         if sample == base:
             look = {"color": style.INK, "linewidth": 2.4, "zorder": 3.5}
             found.append(look | {"label": f"base case ({end})"})
         elif few:
-            name = short(words[place]) if single else f"sample {sample}"
+            name = short(words[place])
             look = {"color": next(own), "linewidth": 1.2, "zorder": 3}
             found.append(look | {"label": f"{style.plain(name)} ({end})"})
         else:
