@@ -23,6 +23,12 @@ def main() -> None:
         asked.append(number)
         raise KeyboardInterrupt
 
+    def unheard(raised: Any) -> None:
+        """Say nothing of a signal in a call of C, which stops then; all else as Python does."""
+        if not (asked and raised.exc_type is KeyboardInterrupt):
+            sys.__unraisablehook__(raised)
+
+    sys.unraisablehook = unheard
     try:
         # Campaigns have their own way to end.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -48,6 +54,7 @@ def main() -> None:
         print(told, file=sys.stderr)
         sys.exit(2)
     finally:
+        sys.unraisablehook = sys.__unraisablehook__
         # Of an interrupt in code that was given as text, as that of named tuples, Python remembers
         # that nobody caught it, and ends by SIGINT whatever the exit code, until the next such.
         eval("0")

@@ -25,7 +25,8 @@ FOLDER = Path(__file__).parent / "c"
 """Sources of the core, and where it is compiled to."""
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
 ASKED = ctypes.CFUNCTYPE(_WHOLE, _WHOLE)
-"""What the core may ask Python: a function of a whole number that returns 0, or 1 to stop it."""
+"""What the core may ask Python: a function of a whole number that returns 1, or 0 to stop it: what
+Python answers if it could not begin."""
 NOT_ASKED = ASKED()
 _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "compiled_from": ("", ctypes.c_char_p),
@@ -81,6 +82,8 @@ _TYPES: dict[str, list[Any]] = {
 }  # fmt: skip
 _KINDS = {NDArray[np.float64]: "a", NDArray[np.int64]: "n", float: "r", int: "w", bool: "w"}
 """The same of fields of tables, by their annotations."""
+_RAISED = 5
+"""How the core ends if an answer fails, see core.h."""
 MOST_KNOWN = 64
 """Packed tables that are kept at most."""
 
@@ -97,11 +100,14 @@ def ask(answer: Callable[[int], None], called: Callable[[Any], int]) -> int:
             answer(what)
         except BaseException as error:
             raised.append(error)
-        return len(raised)
+        return not raised
 
     found = called(ASKED(attempt))
     if raised:
         raise raised[0]
+    # A signal that comes between the call and its ``try`` is raised where nobody can catch it.
+    if found == _RAISED:
+        raise KeyboardInterrupt
     return found
 
 

@@ -74,7 +74,7 @@ def rod_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Fi
                 axes.plot(values["time"], values, color=colour, linestyle=dashes, linewidth=width)
         name = " ".join(reversed(rod.split("_")))
         style.name_panel(axes, name)
-        style.draw_limit(axes, factor * limit, f"limits.rod_stress = {factor * limit:g} {units}")
+        style.draw_limit([axes], factor * limit, f"limits.rod_stress = {factor * limit:g} {units}")
         if peak.place["rod"].startswith(f"{rod}_"):
             worst = stress.sel(peak.place)
             axes.plot(worst["time"], factor * worst, zorder=3, **_LARGEST)
@@ -320,9 +320,9 @@ def cables(dataset: xr.Dataset) -> Figure:
         row[0].set_ylabel(style.label(series[planes[0]][name], width=26))
         if name not in ("neutral_length", "decay"):
             style.span_sizes(row[0], np.where(drawn > 1e-6, drawn, np.nan))
+    style.draw_limit(grid[names.index("tension")], limit, f"limits.tension = {limit:g} N")
     for axes, plane in zip(grid[names.index("tension")], planes, strict=True):
         spans = tension.sel(plane=plane)
-        style.draw_limit(axes, limit, f"limits.tension = {limit:g} N")
         least, most = spans.min("span"), spans.max("span")
         axes.fill_between(dataset["time"], least, most, color=style.PALE, linewidth=0.0)
         worst = spans.sel(span=peak.place["span"])

@@ -524,22 +524,22 @@ _FAR_ABOVE = 4.0
 """Limit over the upper end of an axis from which on it is named and not drawn."""
 
 
-def draw_limit(axes: Axes, limit: float, words: str, right: bool = False) -> None:
+def draw_limit(panels: Sequence[Axes], limit: float, words: str, right: bool = False) -> None:
     """A dashed line at a limit, with its name at its left end, or its ``right``; nothing at NaN.
 
-    Of one that is far above what was drawn before the name alone: its line would leave curves a
-    strip at the foot.
+    Of one far above what was drawn before in all panels the name alone: curves would be a strip.
     """
-    if math.isnan(limit):
-        return
-    if axes.has_data() and limit > _FAR_ABOVE * axes.get_ylim()[1]:
-        axes.annotate(f"{words}, far above", (0.0, 1.0), xytext=(4, -11), color=VERMILION,
-                      xycoords="axes fraction", textcoords="offset points", fontsize=9)  # fmt: skip
-        return
-    axes.axhline(limit, color=VERMILION, linewidth=1.2, linestyle=(0, (5, 2)))
-    axes.annotate(words, (float(right), limit), xytext=(4 - 8 * right, 2),
-                  xycoords=axes.get_yaxis_transform(), textcoords="offset points", fontsize=9,
-                  color=VERMILION, ha="right" if right else "left")  # fmt: skip
+    most = max((each.get_ylim()[1] for each in panels if each.has_data()), default=math.inf)
+    for axes in () if math.isnan(limit) else panels:
+        if limit > _FAR_ABOVE * most:
+            axes.annotate(f"{words}, far above", (0.0, 1.0), xytext=(4, -11), color=VERMILION,
+                          xycoords="axes fraction", textcoords="offset points",
+                          fontsize=9)  # fmt: skip
+            continue
+        axes.axhline(limit, color=VERMILION, linewidth=1.2, linestyle=(0, (5, 2)))
+        axes.annotate(words, (float(right), limit), xytext=(4 - 8 * right, 2),
+                      xycoords=axes.get_yaxis_transform(), textcoords="offset points", fontsize=9,
+                      color=VERMILION, ha="right" if right else "left")  # fmt: skip
 
 
 _MOST_MARGIN = 1e3

@@ -17,7 +17,7 @@ from cable_cases import LAWS as FRICTION
 from cable_cases import RADIUS, random_case, still
 from ringsim.cable.records import Winch
 from ringsim.cable.winding import MotorWinding, StallWinding, WinchReading
-from ringsim.core.library import ask, call
+from ringsim.core.library import ASKED, ask, call
 from ringsim.core.winches import LAWS, Winches
 
 pytestmark = pytest.mark.quick
@@ -119,6 +119,18 @@ def test_a_law_that_says_no_number_or_raises_is_told() -> None:
         found(lambda v: math.nan, 0.05, 1.0)
     with pytest.raises(RuntimeError, match="no law here"):
         found(broken, 0.05, 1.0)
+
+
+def test_a_signal_that_comes_before_an_answer_begins_stops_the_core() -> None:
+    """ctypes drops what is raised there, and answers 0: the run went on with another number."""
+
+    def lost(answer: Any, called: Any) -> int:
+        return ask(answer, lambda _: called(ASKED(lambda what: 0)))
+
+    winches, _ = rope()
+    constant = commanding(lambda v: 0.05)
+    with patch("ringsim.core.winches.ask", lost), constant, pytest.raises(KeyboardInterrupt):
+        winches.at(STEP, np.array([PATH]), np.zeros(1))
 
 
 @pytest.mark.parametrize("end", [0, 1])

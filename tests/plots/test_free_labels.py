@@ -71,7 +71,7 @@ def test_words_stand_between_curves_below_a_limit_in_as_many_lines_as_fit() -> N
         late = np.where(np.abs(TIMES - 6.8) < 0.1, size, 0.0)
         axes.plot(TIMES, np.where(TIMES < 2.0, size, late))
     axes.set_ylim(0.0, 95.0)
-    style.draw_limit(axes, 75.0, "limits.tension = 75 N")
+    style.draw_limit([axes], 75.0, "limits.tension = 75 N")
     mark(axes, Peak(60.0, 1.0, {}), "N", "span 1, winch to section 1 first hinge")
     style.head(figure, axes, xr.Dataset({"status": 0}), "Cables")
     assert covered(figure) == []
@@ -83,6 +83,19 @@ def test_words_stand_between_curves_below_a_limit_in_as_many_lines_as_fit() -> N
     told = words.get_text()
     assert " ".join(told.split()) == ("largest: 60 N at 1 s span 1, winch to section 1 first hinge")
     assert any(line.endswith("60 N at 1 s") or "section 1" in line for line in told.split("\n"))
+
+
+@pytest.mark.parametrize(("limit", "far"), [(60.0, False), (200.0, True)])
+def test_panels_of_one_scale_say_the_same_of_a_limit(limit: float, far: bool) -> None:
+    """The first panel's line would bring the limit within the scale of the second."""
+    figure = Figure()
+    panels = figure.subplots(2, sharey=True)
+    for axes in panels:
+        axes.plot([0.0, 1.0], [10.0, 30.0])
+    style.draw_limit(list(panels), limit, "limit")
+    words = "limit, far above" if far else "limit"
+    assert [axes.texts[0].get_text() for axes in panels] == [words, words]
+    assert [len(axes.lines) for axes in panels] == ([1, 1] if far else [2, 2])
 
 
 def test_names_stay_in_their_corner_where_nothing_is_in_the_way() -> None:

@@ -267,7 +267,7 @@ typedef struct {
 enum { FORCES, SLOPES, LAWS };
 typedef I (*Ask)(I what);
 
-/* How a balance ends.  RAISED: Python has refused to answer. */
+/* How a balance ends.  RAISED: Python has refused to answer, which it tells by 0. */
 enum { BALANCED, UNBALANCED, ENDLESS, PIVOT, ROPES, RAISED };
 
 /* Number of a rope's cable, and whether the rope is at its beginning and at its end. */

@@ -84,7 +84,7 @@ static D ratio_at(const Asked *asked, I winch, D speed) {
         beyond -= own->lengths.at[i - 1] / path;
         own->seen.at[j] = own->sliding.at[j] + more * beyond;
     }
-    if (own->moves && asked->ask(LAWS + QUESTIONS * winch + DECAYS)) return -1.0;
+    if (own->moves && !asked->ask(LAWS + QUESTIONS * winch + DECAYS)) return -1.0;
     logs[first] = 0.0;
     for (I i = first + 1; i < last; i++) {
         I j = ropes->pulley.at[i];
@@ -113,7 +113,7 @@ static I excess(const Asked *asked, D total, D *over) {
         told[PATH_SLOPE] = slopes[0] + elapsed * slopes[1];
         told[TIME] = own->since.at[winch] + elapsed;
         lag(asked, winch, told);
-        if (asked->ask(LAWS + QUESTIONS * winch + COMMAND)) return RAISED;
+        if (!asked->ask(LAWS + QUESTIONS * winch + COMMAND)) return RAISED;
         if (isnan(told[SAID])) return ENDLESS;
         own->found.at[winch] = fmin(fmax(told[SAID], limits[0]), limits[1]);
         *over -= own->found.at[winch];

@@ -404,14 +404,14 @@ def tension(campaign: xr.Dataset) -> Figure:
             names = f"largest tension: sample {worst}"
             axes.plot(own["span"], own.sel(sample=worst), color=style.INK, linewidth=0.9,
                       linestyle=(0, (3, 1.5)), label=names)  # fmt: skip
-        required = limits(campaign, "peak_tension")
-        also = ", as required" * any(most == limit for _, most in required)
-        style.draw_limit(axes, limit, f"limits.tension = {limit:g} N{also}")
-        for word, most in required:
-            if most != limit:
-                style.draw_limit(axes, most, f"required: {word} {most:g} N", right=True)
         axes.set_title(f"{plane} cable", fontsize=9.5)
         axes.xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
+    required = limits(campaign, "peak_tension")
+    also = ", as required" * any(most == limit for _, most in required)
+    style.draw_limit([*grid], limit, f"limits.tension = {limit:g} N{also}")
+    for word, most in required:
+        if most != limit:
+            style.draw_limit([*grid], most, f"required: {word} {most:g} N", right=True)
     style.from_zero(grid[0])  # all panels share it
     spans = found["span"].values
     grid[0].set_xlim(spans[0] - 0.6, spans[-1] + 0.6)  # there is no span 0
