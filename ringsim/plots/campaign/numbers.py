@@ -51,7 +51,7 @@ from ringsim.plots.campaign.frame import (
     standing,
 )
 from ringsim.plots.campaign.tornado import is_one_by_one
-from ringsim.tables import counted, readable, unit_behind, with_unit
+from ringsim.tables import readable, unit_behind, with_unit
 
 _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
@@ -333,6 +333,10 @@ def _size(text: str) -> tuple[float, str]:
         return math.inf, text
 
 
+_NAMED = 4
+"""Inputs without a panel that are named."""
+
+
 @picture(
     "campaign",
     80,
@@ -357,10 +361,10 @@ def by_input(campaign: xr.Dataset) -> Figure:
     size = high - low or max(abs(high), 1.0)
     foot = low - 0.16 * size
     height = np.where(np.isfinite(height), height, foot)
-    others = len(names) - MOST_PANELS
-    if others > 0:
+    others = list[str]()
+    if len(names) > MOST_PANELS:
         names = sorted(names, key=lambda each: -_together(drawn(campaign[each]), height))
-        names = names[:MOST_PANELS]
+        names, others = names[:MOST_PANELS], [called(campaign[n]) for n in names[MOST_PANELS:]]
     figure, panels, _ = style.new_panels(len(names), 3.5, 2.8, 1.4)
     for axes, each in zip(panels, names, strict=True):
         places, labels = drawn(campaign[each])
@@ -385,12 +389,12 @@ def by_input(campaign: xr.Dataset) -> Figure:
         if any(campaign[n].ndim > 1 for n in names)
         else ""
     )
-    if others > 0:
-        which = "has" if others == 1 else "have"
+    if others:
+        more = f" and {len(others) - _NAMED} more" * (len(others) > _NAMED)
         without = " (it counts as least where there is none)" if lost else ""
         note += (
-            f" Not drawn: {counted(others, 'input')}, which of all that are numbers {which} the "
-            f"smallest rank correlation with this one{without}."
+            " Not drawn, since their rank correlation with this output is the smallest"
+            f"{without}: {', '.join(others[:_NAMED])}{more}."
         )
     count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
     # asynchrony_max, deployment_time
