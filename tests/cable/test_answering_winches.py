@@ -168,6 +168,28 @@ def test_the_tension_at_another_speed_is_foreseen(end: int, speed: float, kind: 
     assert foreseen == pytest.approx(ratio, rel=2e-3)
 
 
+def test_two_winches_of_a_rope_answer_together() -> None:
+    """On a path that is alike from either end both motors turn alike, whichever was ahead before:
+    one that went by the other's last speed was behind in this step, and ahead in the next."""
+    motor = MotorWinding(
+        no_load_speed=400.0, stall_torque=0.01, gear_ratio=1000.0, efficiency=0.5, drum_radius=0.02
+    )
+    path = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 1, 0]])
+    case = still(
+        path, 0.0038, rate=(0.005, 0.002), axial_stiffness=1e5, friction=FRICTION["bearing"],
+        slip_speed=0.002, winch=Winch(winding=motor), far_winch=Winch(winding=motor), end="both",
+    )  # fmt: skip
+    winches, state = Winches(case.chain.cables), case.state()
+    assert state.winch_tensions[0, 0] > 1.05 * state.winch_tensions[0, 1]
+    winches.advance(0.0, state, np.zeros(1))
+    case.wound[:], case.wound_rate[:] = winches.at(0.01, state.paths, state.path_rates)
+    first, second = case.wound_rate[0]
+    assert first == pytest.approx(second, rel=1e-9)
+    # 250 N stop a motor that turns at 0.008 m/s without a load.
+    tension = float(case.state().winch_tensions[0, 0])
+    assert first == pytest.approx(0.008 * (1.0 - tension / 250.0), rel=1e-3)
+
+
 def test_a_fault_leaves_what_winches_have_wound() -> None:
     """The step begins in the state before, with the ropes that the fault has made of its own."""
     motor = MotorWinding(

@@ -12,7 +12,7 @@ from ringsim.outputs.family import holds
 from ringsim.rigid.margin import PULLEYS
 from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.resistances import Opening, resistances
-from ringsim.scene import scene_from_toml
+from ringsim.scene import load_scene, scene_from_toml
 from ringsim.simulation import simulate, steps
 from ringsim.variables import Fate
 
@@ -353,3 +353,19 @@ def test_winches_without_a_motor_have_no_such_output() -> None:
     found = simulate(one, "frame")
     assert np.isnan(found.motor_torque.sel(plane="upper")).all()
     assert np.isfinite(found.motor_torque.sel(plane="lower")).all()
+
+
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_motors_at_both_ends_of_a_rope_share_what_they_wind(fidelity: str) -> None:
+    """Alike by symmetry, after a late start of the lower cable, too: each went by the other's last
+    speed, so that they took turns at every step, and steps fell to the shortest."""
+    ends = {f"cables.{plane}.end": "both" for plane in ("upper", "lower")}
+    plain = {"structure.sections": 4, "boom": "none", "net": "none", "solver.end_time": 1.5}
+    late = {"cables.lower.winch.start_time": 0.37}
+    found = simulate(load_scene("ring18-motor").with_values(ends | plain | late), fidelity)
+    assert found["status"] == 0
+    assert found["steps"] < 200
+    first, second = (found["motor_speed"].sel(winch=k).to_numpy() for k in (1, 2))
+    known = np.isfinite(first)
+    assert known.sum() > 20
+    np.testing.assert_allclose(first[known], second[known], rtol=1e-5, atol=1e-3)

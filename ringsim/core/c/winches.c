@@ -71,20 +71,23 @@ static void lag(const Asked *asked, I winch, D *told) {
     told[LAGGING] = median(0.0, found, 2.0 * speeds[0]), told[LAG] = elapsed * more / share;
 }
 
-/* Tension at a winch over the mean tension of its rope, were it to turn at a speed (m/s) while the
-   structure moves as at the beginning of the step; below 0 if Python has refused to answer. */
-static D ratio_at(const Asked *asked, I winch, D speed) {
+/* Tensions at the winches that answer to a rope over its mean tension, were they to turn at these
+   speeds (m/s) while the structure moves as at the beginning of the step; whether Python has
+   answered. */
+static bool ratios_at(const Asked *asked, const D *speeds, D *ratios) {
     const Answering *own = asked->own;
     const RopeTable *ropes = asked->ropes;
     I first = ropes->starts.at[asked->rope], last = ropes->ends.at[asked->rope];
-    D more = speed - own->speeds.at[2 * winch], path = own->began.at[2 * asked->rope];
-    D beyond = 1.0 - (D)(winch % 2), *logs = own->logs.at, most = 0.0, mean = 0.0;
+    D path = own->began.at[2 * asked->rope], *logs = own->logs.at, most = 0.0, mean = 0.0;
+    D beyond = 1.0, more[2] = {0.0, 0.0};
+    for (I k = 0; k < asked->count; k++)
+        more[asked->winches[k] % 2] = speeds[k] - own->speeds.at[2 * asked->winches[k]];
     for (I i = first + 1; i < last; i++) {
         I j = ropes->pulley.at[i];
         beyond -= own->lengths.at[i - 1] / path;
-        own->seen.at[j] = own->sliding.at[j] + more * beyond;
+        own->seen.at[j] = own->sliding.at[j] + more[0] * beyond + more[1] * (beyond - 1.0);
     }
-    if (own->moves && !asked->ask(LAWS + QUESTIONS * winch + DECAYS)) return -1.0;
+    if (own->moves && !asked->ask(LAWS + QUESTIONS * asked->winches[0] + DECAYS)) return false;
     logs[first] = 0.0;
     for (I i = first + 1; i < last; i++) {
         I j = ropes->pulley.at[i];
@@ -92,23 +95,23 @@ static D ratio_at(const Asked *asked, I winch, D speed) {
         if (logs[i] > most) most = logs[i];
     }
     for (I i = first; i < last; i++) mean += exp(logs[i] - most) * own->lengths.at[i] / path;
-    return ropes->alive.at[asked->rope] * exp(logs[winch % 2 ? last - 1 : first] - most) / mean;
+    for (I k = 0; k < asked->count; k++) {
+        D at = logs[asked->winches[k] % 2 ? last - 1 : first];
+        ratios[k] = ropes->alive.at[asked->rope] * exp(at - most) / mean;
+    }
+    return true;
 }
 
-/* How much faster the winches of a rope turn at a speed (m/s) of all than their laws command. */
-static I excess(const Asked *asked, D total, D *over) {
+/* What the laws of a rope's winches command, into found, where these turn at speeds (m/s) and the
+   rope has a mean tension (N). */
+static I command(const Asked *asked, const D *at, D mean) {
     const Answering *own = asked->own;
-    D *told = own->told.at, elapsed = own->elapsed.at[0];
-    D left = asked->natural - wound_by(&asked->weights, total);
-    D mean = tension_of(asked->ropes->material.at + 3 * asked->rope, left, total + asked->rest,
-                        asked->path);
-    *over = total;
+    D *told = own->told.at, elapsed = own->elapsed.at[0], ratios[2];
+    if (!ratios_at(asked, at, ratios)) return RAISED;
     for (I k = 0; k < asked->count; k++) {
         I winch = asked->winches[k];
         const D *limits = own->limits.at + 2 * winch, *slopes = own->slopes.at + 2 * winch;
-        D ratio = ratio_at(asked, winch, total / (D)asked->count);
-        if (ratio < 0.0) return RAISED;
-        told[TENSION] = mean * ratio;
+        told[TENSION] = mean * ratios[k];
         told[PATH_RATE] = asked->follow / (D)asked->count;
         told[PATH_SLOPE] = slopes[0] + elapsed * slopes[1];
         told[TIME] = own->since.at[winch] + elapsed;
@@ -116,9 +119,46 @@ static I excess(const Asked *asked, D total, D *over) {
         if (!asked->ask(LAWS + QUESTIONS * winch + COMMAND)) return RAISED;
         if (isnan(told[SAID])) return ENDLESS;
         own->found.at[winch] = fmin(fmax(told[SAID], limits[0]), limits[1]);
-        *over -= own->found.at[winch];
     }
-    return isnan(*over) ? ENDLESS : BALANCED;
+    return BALANCED;
+}
+
+/* The same of two winches that turn at a total speed: by how much the first is the faster one goes
+   with what their laws command.  That of the step before would not do: each end that is ahead finds
+   more tension, falls behind in this step, and is ahead again in the next, however short they are. */
+static I command_both(const Asked *asked, D total, D mean) {
+    const Answering *own = asked->own;
+    const I *winch = asked->winches;
+    const D *limits[] = {own->limits.at + 2 * winch[0], own->limits.at + 2 * winch[1]};
+    D low = limits[0][0] - limits[1][1], high = limits[0][1] - limits[1][0], gain = 1.0;
+    D apart = own->speeds.at[2 * winch[0]] - own->speeds.at[2 * winch[1]], from = 0.0, before = 0.0;
+    apart = fmin(fmax(apart, low), high);
+    for (I k = 0;; k++) {
+        D at[] = {0.5 * (total + apart), 0.5 * (total - apart)};
+        I how = command(asked, at, mean);
+        if (how != BALANCED) return how;
+        D over = apart - (own->found.at[winch[0]] - own->found.at[winch[1]]);
+        D same = SAME + ALIKE * fabs(total);
+        *(over > 0.0 ? &high : &low) = apart;
+        if (fabs(over) <= same || high - low <= 2.0 * same) return BALANCED;
+        /* It rises by at least the difference itself, as in ``search``. */
+        if (k && apart != from) gain = fmax((over - before) / (apart - from), 1.0);
+        before = over, from = apart;
+        D way = fmax(fabs(over) / gain, same);
+        apart = k < SECANTS ? fmin(fmax(apart - copysign(way, over), low), high)
+                            : 0.5 * (low + high);
+    }
+}
+
+/* How much faster the winches of a rope turn at a speed (m/s) of all than their laws command. */
+static I excess(const Asked *asked, D total, D *over) {
+    D left = asked->natural - wound_by(&asked->weights, total);
+    D mean = tension_of(asked->ropes->material.at + 3 * asked->rope, left, total + asked->rest,
+                        asked->path);
+    I how = asked->count == 1 ? command(asked, &total, mean) : command_both(asked, total, mean);
+    *over = total;
+    for (I k = 0; k < asked->count; k++) *over -= asked->own->found.at[asked->winches[k]];
+    return how == BALANCED && isnan(*over) ? ENDLESS : how;
 }
 
 /* Where the excess is zero, from a guess and how fast it rises there: it rises by at least the speed.
@@ -237,14 +277,17 @@ I find_left(const Answering *own, const RopeTable *ropes, Ask ask, D *left, I n)
     return BALANCED;
 }
 
-/* See ratio_at, of a winch by its number, 2 cable + end; -1 for one that does not answer. */
+/* See ratios_at, of a winch by its number, 2 cable + end; -1 for one that does not answer. */
 D ratio_of_winch(const Answering *own, const RopeTable *ropes, Ask ask, I winch, D speed) {
     Place place = {-1, false, false};
     for (I rope = 0; rope < ropes->starts.n; rope++) {
         place = place_behind(ropes, rope, place);
         Asked asked = asked_of(own, ropes, ask, rope, place);
+        D at[2] = {0.0, 0.0}, ratios[2];
         for (I k = 0; k < asked.count; k++)
-            if (asked.winches[k] == winch) return ratio_at(&asked, winch, speed);
+            at[k] = asked.winches[k] == winch ? speed : own->speeds.at[2 * asked.winches[k]];
+        for (I k = 0; k < asked.count; k++)
+            if (asked.winches[k] == winch) return ratios_at(&asked, at, ratios) ? ratios[k] : -1.0;
     }
     return -1.0;
 }
