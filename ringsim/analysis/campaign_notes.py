@@ -6,7 +6,6 @@ import json
 import re
 import textwrap
 import tomllib
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,11 +21,8 @@ from ringsim.analysis.design import (
     UNKNOWN,
     blocks_of,
     by_path,
-    called,
     drawn,
-    endings,
     endings_of,
-    inputs,
     kinds_of_ends,
     learnt_lines,
 )
@@ -49,7 +45,6 @@ from ringsim.outputs.base import DOUBT, UNCERTAIN, finest, may_be_off, without_d
 from ringsim.outputs.family import Array
 from ringsim.outputs.motors import left_by_winches
 from ringsim.overrides import flat
-from ringsim.sampling.distributions import labels_of
 from ringsim.tables import (
     Table,
     chance_text,
@@ -59,7 +54,7 @@ from ringsim.tables import (
     readable,
     with_unit,
 )
-from ringsim.variables import AT_REST, GO_ON, Variable
+from ringsim.variables import AT_REST, GO_ON, Fate, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -166,33 +161,6 @@ def _kind(remark: str) -> str:
 
 
 _LATE = "the least drive margin is that of "
-
-
-def reached_by_words(campaign: xr.Dataset, start: str) -> list[str]:
-    """How many samples reached their goal with each word that was drawn of inputs whose paths begin
-    so, as "deployed without faults: 37 of 37".
-    """
-    held, words, lines = ran(campaign), endings(campaign), list[str]()
-    came = np.isin(words, REACHED)
-    for name in inputs(campaign):
-        values = campaign[name].to_numpy()
-        if not called(campaign[name]).startswith(start) or values.dtype.kind not in "OU":
-            continue
-        told = labels_of(values) if values.ndim == 1 else values
-        drawn_words = Counter(told[held].tolist() if told.ndim == 1 else ())
-        for word, count in drawn_words.most_common(_MOST_WORDS):
-            own = held & (told == word)
-            gone = int((own & ~good(campaign)).sum())
-            more = f", {counted(gone, 'failed run')}" * bool(gone)
-            how = f"without {start}" if word == "none" else f"with {word}"
-            lines.append(f"deployed {how}: {int((own & came).sum())} of {count}{more}")
-        if (left := len(drawn_words) - _MOST_WORDS) > 0:
-            lines.append(f"and with {counted(left, 'other value')}: see campaign.nc")
-    return lines
-
-
-_MOST_WORDS = 8
-"""Values of an input of words that are told one by one."""
 
 
 def late_line(campaign: xr.Dataset) -> str:
@@ -519,7 +487,25 @@ def slow_latches(campaign: xr.Dataset) -> Array:
     """How many latches of each sample met a rate that is closer to the least at which they catch
     than the rate's numerical error.
     """
-    path, none = "latch.min_rate", np.zeros(campaign.sizes["sample"])
+    return np.asarray(_slow(campaign).sum(axis=(1, 2)), dtype=float)
+
+
+def open_outcomes(campaign: xr.Dataset) -> Mask:
+    """Which samples would have another outcome if the latches of which it is uncertain whether they
+    catch did otherwise: none that stalled before its stops, and none another latch of which has
+    missed for certain.
+    """
+    fate, slow = numbers(campaign, OUTCOME), _slow(campaign)
+    missed = campaign["latched"].to_numpy() == 0 if "latched" in campaign else np.zeros_like(slow)
+    named = uncertain_latches(campaign)
+    certain = (fate == Fate.NOT_LATCHED) & ((missed & ~slow).sum(axis=(1, 2)) > named)
+    some = slow.any(axis=(1, 2)) | (named > 0.0)
+    return np.asarray(some & np.isin(fate, [Fate.DEPLOYED, Fate.NOT_LATCHED]) & ~certain)
+
+
+def _slow(campaign: xr.Dataset) -> NDArray[np.bool_]:
+    """Those latches, shape (samples, planes, sections), or (samples, 1, 1) of none."""
+    path, none = "latch.min_rate", np.zeros((campaign.sizes["sample"], 1, 1), dtype=bool)
     varied = by_path(campaign)
     parts = any(each == "latch" or each.startswith(("latch[", f"{path}[")) for each in varied)
     if not {"latch_rate", "least_latch_rate_error"} <= {*campaign} or parts:
@@ -532,8 +518,7 @@ def slow_latches(campaign: xr.Dataset) -> Array:
     if not least.any() or least.shape[-1] not in (1, rates.shape[-1]):
         return none
     bars, _ = bars_of(campaign, "least_latch_rate")
-    slow = (np.abs(rates - least) < bars[:, None, None]) & (least > 0.0)
-    return np.asarray(slow.sum(axis=(1, 2)), dtype=float)
+    return np.asarray((np.abs(rates - least) < bars[:, None, None]) & (least > 0.0))
 
 
 _LATCHES = re.compile(rf"whether the latch of ([^;]*?)(?: and (\d+) more)? {UNCERTAIN}")

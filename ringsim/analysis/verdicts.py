@@ -15,6 +15,7 @@ from ringsim.analysis.campaign_notes import (
     doubtful,
     drive_notes,
     marked,
+    open_outcomes,
     opened,
     slow_latches,
     uncertain_latches,
@@ -104,14 +105,11 @@ def judge(
     for name, wanted in requirements.items():
         require_values(campaign, name, wanted)
         off = doubted.get(name, none)
-        if name == LATCHED or (name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word):
-            latches = np.maximum(uncertain_latches(campaign), slow_latches(campaign))  # mostly both
-            if name == LATCHED:  # so many more or fewer may have caught
-                latches = latches - np.abs(wanted.beyond(numbers(campaign, name)))
-            else:  # no latch opens a ring that stalled before its stops
-                ends = campaign[OUTCOME].to_numpy()
-                latches = latches * np.isin(ends, [Fate.DEPLOYED, Fate.NOT_LATCHED])
-            off = off | (latches > 0.0)
+        if name == LATCHED:  # so many more or fewer may have caught; mostly both tell of the same
+            latches = np.maximum(uncertain_latches(campaign), slow_latches(campaign))
+            off = off | (latches > np.abs(wanted.beyond(numbers(campaign, name))))
+        if name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word:
+            off = off | open_outcomes(campaign)
         for key, value in _judged(campaign, name, wanted, placed, rule, off).items():
             columns[key].append(value)
     known = {

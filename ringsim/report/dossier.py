@@ -14,10 +14,10 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis import campaign_notes as notes
-from ringsim.analysis.design import REACHED, by_path, learnt_lines
+from ringsim.analysis.design import REACHED, by_path, called, endings, inputs, learnt_lines
 from ringsim.analysis.engines import differences, verdict
 from ringsim.analysis.influence_text import what_matters
-from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quantities
+from ringsim.analysis.intervals import CHECKED, good, is_moment, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.residuals import clock_line, residual_table, residuals
 from ringsim.analysis.study import SOURCES, analyse
@@ -50,6 +50,7 @@ from ringsim.report.answers import (
 )
 from ringsim.report.page import provenance, values_of
 from ringsim.report.shell import written
+from ringsim.sampling.distributions import labels_of
 from ringsim.tables import Table, block_lines, counted, number_text, with_unit
 from ringsim.variables import Status
 
@@ -325,6 +326,33 @@ _LATE = 0.01
 """Share of a run from which on a start that is drawn is a late winch, and no tolerance."""
 
 
+def reached_by_words(campaign: xr.Dataset, start: str) -> list[str]:
+    """How many samples reached their goal with each word that was drawn of inputs whose paths begin
+    so, as "deployed without faults: 37 of 37".
+    """
+    held, words, lines = ran(campaign), endings(campaign), list[str]()
+    came = np.isin(words, REACHED)
+    for name in inputs(campaign):
+        values = campaign[name].to_numpy()
+        if not called(campaign[name]).startswith(start) or values.dtype.kind not in "OU":
+            continue
+        told = labels_of(values) if values.ndim == 1 else values
+        drawn_words = Counter(told[held].tolist() if told.ndim == 1 else ())
+        for word, count in drawn_words.most_common(_MOST_WORDS):
+            own = held & (told == word)
+            gone = int((own & ~good(campaign)).sum())
+            more = f", {counted(gone, 'failed run')}" * bool(gone)
+            how = f"without {start}" if word == "none" else f"with {word}"
+            lines.append(f"deployed {how}: {int((own & came).sum())} of {count}{more}")
+        if (left := len(drawn_words) - _MOST_WORDS) > 0:
+            lines.append(f"and with {counted(left, 'other value')}: see campaign.nc")
+    return lines
+
+
+_MOST_WORDS = 8
+"""Values of an input of words that are told one by one."""
+
+
 @item(ECSS, "4.8.2.6.3 b Failure cases", "Failures of parts, and what to do then.")
 def _faults(of: Of) -> Answer:
     drawn, ran = by_path(of.campaign), numbers(of.campaign, "final_time")
@@ -337,7 +365,7 @@ def _faults(of: Of) -> Answer:
 
     failed = drawn_lines(of, lambda path, _: path.startswith("faults") or "stop_time" in path)
     found = Answer([*failed, *drawn_lines(of, late)])
-    found.result += notes.reached_by_words(of.campaign, "faults")
+    found.result += reached_by_words(of.campaign, "faults")
     if single := one_at_a_time(of.campaign):
         ends = Counter(of.analysis["case_outcome"].values.tolist())
         told = ", ".join(f"{count} {end}" for end, count in ends.items())

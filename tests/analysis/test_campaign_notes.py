@@ -15,7 +15,6 @@ from ringsim.analysis.campaign_notes import (
     late_line,
     peak_lines,
     plane_line,
-    reached_by_words,
     remark_lines,
     rigid_line,
 )
@@ -26,6 +25,7 @@ from ringsim.analysis.verdicts import verdict_table
 from ringsim.analysis.worst import margin_table
 from ringsim.outputs.base import SMOOTHED
 from ringsim.plots.figures import figures_of
+from ringsim.report.dossier import reached_by_words
 from ringsim.variables import Fate, Status
 
 pytestmark = pytest.mark.quick
@@ -254,6 +254,18 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
         told = f"met, if its numbers hold: may be off in {count} of 30 samples"
         assert table.rows[0][1] == ("met" if stands else told)
         assert any("uncertain whether all latches catch" in n for n in table.notes) != stands
+    # A ring is not deployed for certain if another latch of it has missed, as one that has failed.
+    for certain, count in ((0, 30), (1, 29), (3, 27)):
+        latched = np.ones((30, 2, 4), dtype=int)
+        latched[:certain, 1, 0], latched[:, 0, 2] = 0, 0  # lower 1, and upper 3, which is in doubt
+        fate = np.where(np.arange(30) < 10, Fate.NOT_LATCHED, Fate.DEPLOYED)
+        unsure = made.assign(
+            outcome=("sample", fate), latched=(("sample", "plane", "section"), latched),
+            latch_rate=(("sample", "plane", "section"), np.full((30, 2, 4), 0.4)),
+        )  # fmt: skip
+        notes = verdict_table(analyse(unsure, wanted)).notes
+        (note,) = (each for each in notes if "uncertain whether" in each)
+        assert note.startswith(f"outcome: in {count} samples it is uncertain")
     # No latch of a ring that stalled before its stops is in doubt.
     made["outcome"].values[:3] = Fate.STALLED
     (note,) = [n for n in verdict_table(analyse(made, wanted)).notes if "uncertain whether" in n]
