@@ -23,10 +23,13 @@ def main() -> None:
         asked.append(number)
         raise KeyboardInterrupt
 
+    hook = sys.unraisablehook
+
     def unheard(raised: Any) -> None:
-        """Say nothing of a signal in a call of C, which stops then; all else as Python does."""
-        if not (asked and raised.exc_type is KeyboardInterrupt):
-            sys.__unraisablehook__(raised)
+        """Say nothing of a signal in an answer to the core, which stops then."""
+        of_core = raised.exc_type is KeyboardInterrupt and "ctypes callback" in str(raised.err_msg)
+        if not (asked and of_core):
+            hook(raised)
 
     sys.unraisablehook = unheard
     try:
@@ -54,7 +57,7 @@ def main() -> None:
         print(told, file=sys.stderr)
         sys.exit(2)
     finally:
-        sys.unraisablehook = sys.__unraisablehook__
+        sys.unraisablehook = hook
         # Of an interrupt in code that was given as text, as that of named tuples, Python remembers
         # that nobody caught it, and ends by SIGINT whatever the exit code, until the next such.
         eval("0")

@@ -6,7 +6,7 @@ import json
 import re
 import textwrap
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -116,7 +116,7 @@ def ending_lines(
         told = "" if word in REACHED else told
         over = word in [each.words for each in GO_ON]
         if opened is not None and over and opened[own].any():
-            told = f", {int(opened[own].sum())} of them with all V-joints locked{told}"
+            told = f", {int(opened[own].sum())} of them opened all the same{told}"
         if word != UNKNOWN:
             lines.append(f"{word.removeprefix(LOST)}: {len(own)} of {run}{told}")
     return lines
@@ -450,12 +450,17 @@ def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], dict[str, str]]:
 def uncertain_latches(campaign: xr.Dataset) -> Array:
     """Of how many latches each sample says that it is uncertain whether they catch."""
     found = np.zeros(campaign.sizes["sample"])
-    if "reason" in campaign:
-        reasons = campaign["reason"].to_numpy()
-        for place in np.flatnonzero(good(campaign)).tolist():
-            if said := _LATCHES.search(str(reasons[place])):
-                found[place] = said[1].count(",") + 1 + int(said[2] or 0)
+    for place, said in _said(campaign):
+        found[place] = said[1].count(",") + 1 + int(said[2] or 0)
     return found
+
+
+def _said(campaign: xr.Dataset) -> Iterator[tuple[int, re.Match[str]]]:
+    """What samples say of latches of which it is uncertain whether they catch, by their places."""
+    reasons = campaign["reason"].to_numpy() if "reason" in campaign else ()
+    for place in np.flatnonzero(good(campaign)).tolist() if len(reasons) else ():
+        if said := _LATCHES.search(str(reasons[place])):
+            yield place, said
 
 
 _ENOUGH = 3
@@ -497,9 +502,18 @@ def open_outcomes(campaign: xr.Dataset) -> Mask:
     """
     fate, slow = numbers(campaign, OUTCOME), _slow(campaign)
     missed = campaign["latched"].to_numpy() == 0 if "latched" in campaign else np.zeros_like(slow)
-    named = uncertain_latches(campaign)
-    certain = (fate == Fate.NOT_LATCHED) & ((missed & ~slow).sum(axis=(1, 2)) > named)
-    some = slow.any(axis=(1, 2)) | (named > 0.0)
+    unsure, more = np.zeros(missed.shape, dtype=bool), np.zeros(len(missed))
+    planes = campaign["plane"].values.tolist() if "plane" in campaign else []
+    for sample, said in _said(campaign) if "latched" in campaign else ():
+        more[sample], plane = int(said[2] or 0), ""  # any of those without a name may have missed
+        for each in said[1].split(", "):  # "upper 3, 4, lower 5"
+            *named, section = each.split()
+            plane = named[0] if named else plane
+            if plane in planes and 0 < int(section) <= unsure.shape[2]:
+                unsure[sample, planes.index(plane), int(section) - 1] = True
+    certain = (missed & ~slow & ~unsure).sum(axis=(1, 2)) > more
+    some = slow.any(axis=(1, 2)) | (uncertain_latches(campaign) > 0.0)
+    certain &= fate == Fate.NOT_LATCHED
     return np.asarray(some & np.isin(fate, [Fate.DEPLOYED, Fate.NOT_LATCHED]) & ~certain)
 
 

@@ -463,9 +463,9 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
                 told = f"; their inputs differ in {', '.join(other)}" * bool(other)
                 return Pairs(*found, f"samples are paired by their seeds{told}")
             unlike = (
-                f": their seeds are equal, but {', '.join(moved)} have other values, since inputs "
-                "before them, or places of these, are more or fewer; pairs show smaller differences"
-                ": in a random design put inputs with each_section last, and further ones behind"
+                ", although their seeds are equal: another input, its places, a correlation or the "
+                f"number of samples has moved the draws of {', '.join(moved)}; pairs show smaller "
+                "differences: in a random design give new inputs last, those with each_section too"
             )
     rows = [_rows(each, inputs) for each in (first, second)]
     if inputs and all(len(set(each)) == len(each) for each in rows):

@@ -371,7 +371,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
             one = analysis.sel(kind=over)
             count, opened = (int(one[f"outcome_{name}"]) for name in ("samples", "open"))
             told = f"of {counted(count, 'sample')} {over}, {opened} opened all the same"
-            notes += [f"{told}: all V-joints locked"] * bool(opened)
+            notes += [told] * bool(opened)
     return Table(("outcome", "samples", "share", "95 % interval", *_parts()), rows, notes)
 
 

@@ -54,7 +54,7 @@ _ZERO = 273.15
 _NOTE_ON_UNUSUAL = (
     "unusual inputs: first those that separate the failures from the other samples, or that go "
     "with the output, then those outside the central 90 % of all samples; in brackets the "
-    "difference from the median (for one place that of all), or how many times the median it is, "
+    "difference from the median (one place: of all places), or how many times the median it is, "
     "for temperatures the value in C"
 )
 

@@ -25,8 +25,8 @@ FOLDER = Path(__file__).parent / "c"
 """Sources of the core, and where it is compiled to."""
 _NONE, _WHOLE, _REAL, _TRUTH = None, ctypes.c_int64, ctypes.c_double, ctypes.c_bool
 ASKED = ctypes.CFUNCTYPE(_WHOLE, _WHOLE)
-"""What the core may ask Python: a function of a whole number that returns 1, or 0 to stop it: what
-Python answers if it could not begin."""
+"""What the core may ask Python: a function of a whole number that returns its complement, or 0 to
+stop it."""
 NOT_ASKED = ASKED()
 _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "compiled_from": ("", ctypes.c_char_p),
@@ -95,12 +95,12 @@ def ask(answer: Callable[[int], None], called: Callable[[Any], int]) -> int:
     """
     raised: list[BaseException] = []
 
-    def attempt(what: int) -> int:
+    def attempt(question: int) -> int:
         try:
-            answer(what)
+            answer(question & 0xFFFF)  # the rest is its number
         except BaseException as error:
             raised.append(error)
-        return not raised
+        return 0 if raised else ~question
 
     found = called(ASKED(attempt))
     if raised:

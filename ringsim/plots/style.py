@@ -532,9 +532,9 @@ def draw_limit(panels: Sequence[Axes], limit: float, words: str, right: bool = F
     most = max((each.get_ylim()[1] for each in panels if each.has_data()), default=math.inf)
     for axes in () if math.isnan(limit) else panels:
         if limit > _FAR_ABOVE * most:
-            axes.annotate(f"{words}, far above", (0.0, 1.0), xytext=(4, -11), color=VERMILION,
-                          xycoords="axes fraction", textcoords="offset points",
-                          fontsize=9)  # fmt: skip
+            axes.annotate(f"{words}, far above", (float(right), 1.0), xytext=(4 - 8 * right, -11),
+                          xycoords="axes fraction", textcoords="offset points", color=VERMILION,
+                          fontsize=9, ha="right" if right else "left")  # fmt: skip
             continue
         axes.axhline(limit, color=VERMILION, linewidth=1.2, linestyle=(0, (5, 2)))
         axes.annotate(words, (float(right), limit), xytext=(4 - 8 * right, 2),

@@ -13,6 +13,7 @@ from matplotlib.text import Text
 
 from ringsim.analysis.campaign_notes import (
     late_line,
+    open_outcomes,
     peak_lines,
     plane_line,
     remark_lines,
@@ -263,6 +264,10 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
             outcome=("sample", fate), latched=(("sample", "plane", "section"), latched),
             latch_rate=(("sample", "plane", "section"), np.full((30, 2, 4), 0.4)),
         )  # fmt: skip
+        # That a latch which has caught is in doubt, too, makes no other one's miss uncertain.
+        also = unsure.assign(latched=(("sample", "plane", "section"), np.where(
+            np.arange(4) == 2, 1, latched)))  # fmt: skip
+        assert open_outcomes(also).sum() == 30 - certain
         notes = verdict_table(analyse(unsure, wanted)).notes
         (note,) = (each for each in notes if "uncertain whether" in each)
         assert note.startswith(f"outcome: in {count} samples it is uncertain")

@@ -197,7 +197,7 @@ def test_seeds_pair_nothing_where_other_inputs_have_moved_the_draws():
     told = compare(*both).attrs
     assert told["pairs"] == 0
     assert told["pairing"].startswith(
-        "samples are not paired: their seeds are equal, but loads.force have other values, since"
+        "samples are not paired, although their seeds are equal: another input, its places, a "
     )
     # Behind nothing whose number of places changes it keeps its values; the pulleys are named.
     both[1]["loads_force"][:] = draws[0]

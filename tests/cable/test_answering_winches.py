@@ -121,16 +121,28 @@ def test_a_law_that_says_no_number_or_raises_is_told() -> None:
         found(broken, 0.05, 1.0)
 
 
-def test_a_signal_that_comes_before_an_answer_begins_stops_the_core() -> None:
-    """ctypes drops what is raised there, and answers 0: the run went on with another number."""
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("at", [1, 2, 5])
+def test_a_signal_that_comes_before_an_answer_begins_stops_the_core(at: int) -> None:
+    """ctypes drops what is raised there, and returns what it has, as the last answer: the run went
+    on with another number."""
+    asked: list[int] = []
 
     def lost(answer: Any, called: Any) -> int:
-        return ask(answer, lambda _: called(ASKED(lambda what: 0)))
+        def struck(question: int) -> int:
+            asked.append(question)
+            if len(asked) == at:
+                raise KeyboardInterrupt
+            answer(question & 0xFFFF)
+            return ~question
+
+        return ask(answer, lambda _: called(ASKED(struck)))
 
     winches, _ = rope()
-    constant = commanding(lambda v: 0.05)
-    with patch("ringsim.core.winches.ask", lost), constant, pytest.raises(KeyboardInterrupt):
+    steep = commanding(lambda v: 0.05 - 3.0 * v**3)
+    with patch("ringsim.core.winches.ask", lost), steep, pytest.raises(KeyboardInterrupt):
         winches.at(STEP, np.array([PATH]), np.zeros(1))
+    assert len(asked) == at
 
 
 @pytest.mark.parametrize("end", [0, 1])

@@ -265,9 +265,17 @@ typedef struct {
 /* What is asked of Python: forces of parts that are not in the tables, how these change, and from
    LAWS on what laws of winches say. */
 enum { FORCES, SLOPES, LAWS };
-typedef I (*Ask)(I what);
+typedef I (*Ask)(I question);
 
-/* How a balance ends.  RAISED: Python has refused to answer, which it tells by 0. */
+/* Whether Python has answered.  What it returns if a signal strikes before it could begin is whatever
+   lay in its place, as the last answer: each question has a number, and its complement answers it. */
+static inline bool answered(Ask ask, I what) {
+    static I count = 0;
+    I question = (++count << 16) | what;
+    return ask(question) == ~question;
+}
+
+/* How a balance ends.  RAISED: Python has not answered. */
 enum { BALANCED, UNBALANCED, ENDLESS, PIVOT, ROPES, RAISED };
 
 /* Number of a rope's cable, and whether the rope is at its beginning and at its end. */

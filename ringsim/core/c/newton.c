@@ -55,7 +55,7 @@ I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, c
                 step, &start->followed, &now->pose, now->hub.at, &system->arms, &now->followed,
                 &now->strains, system->kept.at, g, size);
     note_joints(&system->joints, &system->rubbing, rates + cuts[ANGLES]);
-    if (asks & PARTS && !ask(FORCES)) return RAISED;
+    if (asks & PARTS && !answered(ask, FORCES)) return RAISED;
     if (roped->ropes.starts.n > 0) {
         const D *places = now->followed.place.at + cuts[PATHS];
         rates += cuts[PATHS];
@@ -113,7 +113,7 @@ I stiffen(const System *system, const Roped *roped, I asks, Ask ask, D step, con
                   border, wide);
     add_dry_slopes(&system->joints, &system->rubbing, now->pose.angle.at, rates + cuts[ANGLES],
                    by_rate, mesh, &system->fronts);
-    if (asks & PARTS && !ask(SLOPES)) return RAISED;
+    if (asks & PARTS && !answered(ask, SLOPES)) return RAISED;
     if (roped->ropes.starts.n > 0)
         add_cables(system, roped, rates + cuts[PATHS], by_rate, factors, wide, 3 * strung);
     if (!factor(mesh, &system->fronts)) return PIVOT;

@@ -87,7 +87,7 @@ static bool ratios_at(const Asked *asked, const D *speeds, D *ratios) {
         beyond -= own->lengths.at[i - 1] / path;
         own->seen.at[j] = own->sliding.at[j] + more[0] * beyond + more[1] * (beyond - 1.0);
     }
-    if (own->moves && !asked->ask(LAWS + QUESTIONS * asked->winches[0] + DECAYS)) return false;
+    if (own->moves && !answered(asked->ask, LAWS + QUESTIONS * asked->winches[0] + DECAYS)) return false;
     logs[first] = 0.0;
     for (I i = first + 1; i < last; i++) {
         I j = ropes->pulley.at[i];
@@ -116,7 +116,7 @@ static I command(const Asked *asked, const D *at, D mean) {
         told[PATH_SLOPE] = slopes[0] + elapsed * slopes[1];
         told[TIME] = own->since.at[winch] + elapsed;
         lag(asked, winch, told);
-        if (!asked->ask(LAWS + QUESTIONS * winch + COMMAND)) return RAISED;
+        if (!answered(asked->ask, LAWS + QUESTIONS * winch + COMMAND)) return RAISED;
         if (isnan(told[SAID])) return ENDLESS;
         own->found.at[winch] = fmin(fmax(told[SAID], limits[0]), limits[1]);
     }
@@ -138,7 +138,7 @@ static I command_both(const Asked *asked, D total, D mean) {
         I how = command(asked, at, mean);
         if (how != BALANCED) return how;
         D over = apart - (own->found.at[winch[0]] - own->found.at[winch[1]]);
-        D same = SAME + ALIKE * fabs(total);
+        D same = SAME + ALIKE * fmax(fabs(total), fabs(apart));
         *(over > 0.0 ? &high : &low) = apart;
         if (fabs(over) <= same || high - low <= 2.0 * same) return BALANCED;
         /* It rises by at least the difference itself, as in ``search``. */
