@@ -22,10 +22,12 @@ from ringsim.parts.faults import AT_ONCE
 # to: with V the speed of all such winches of a rope, h the time into the step, S its path and M its
 # natural length without V,
 #
-#     V = sum_i command_i(r_i(V) q(y)),   y = EA (S / (M - W(V)) - 1 + t_d de/dt),
+#     V = sum_i command_i(r_i q(y)),   y = EA (S / (M - W(V)) - 1 + t_d de/dt),
 #
-# r_i(V) the ratio of the tension at a winch to the rope's mean tension, were the n winches of the
-# rope to turn at V / n each while the structure moves as at the beginning of the step.  The rope
+# r_i the ratio of the tension at a winch to the rope's mean tension, were its winches to turn as
+# their laws command while the structure moves as at the beginning of the step: of two, the speeds
+# (V + D) / 2 and (V - D) / 2, where D is the difference of what is commanded at them.  It rises by
+# less than D does, since the winch that is ahead has the larger tension: one D for each V.  The rope
 # that they wind in the step follows from backward differences of second order, with g the mean
 # speed of the step before and r = h over its length,
 #
