@@ -27,8 +27,8 @@ from ringsim.parts.faults import AT_ONCE
 # r_i the ratio of the tension at a winch to the rope's mean tension, were its winches to turn as
 # their laws command while the structure moves as at the beginning of the step: of two, the speeds
 # (V + D) / 2 and (V - D) / 2, where D is the difference of what is commanded at them.  It rises by
-# less than D does, since the winch that is ahead has the larger tension: one D for each V.  The rope
-# that they wind in the step follows from backward differences of second order, with g the mean
+# less than D does, since the winch that is ahead has the larger tension: one D for each V.  The
+# rope that they wind in the step follows from backward differences of second order, with g the mean
 # speed of the step before and r = h over its length,
 #
 #     W(V) = h ((1 + r) V + r median(0, g, 2 V)) / (1 + 2 r);   W(V) = h V behind a jump.
