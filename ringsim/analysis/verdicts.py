@@ -381,7 +381,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         bad, used = one["samples_violating"], one["samples_used"]
         if verdict == Verdict.NO_POPULATION:  # a share of what was chosen is no estimate
             one["probability"], chosen = np.nan, True
-            but = f"; {one['samples_close']} of all: closer to the limit than the numerical error"
+            but = f"; closer to the limit than the numerical error: {one['samples_close']}"
             but *= bool(one["samples_close"])
             notes.append(f"{name}: {bad} of {used} samples violate it{but}")
         rows.append((

@@ -280,7 +280,7 @@ _OFF = re.compile(
     rf"; (?:steps of|({SMOOTHED}))[^;]*, so ([^;]*) may be off: "
     r"([^;(]*(?:\([^;()]*times the steps\))?)"
 )
-_VALUE = re.compile(r"= ([\d.e+-]+)")
+_VALUE, _SLIP = re.compile(r"= ([\d.e+-]+)"), re.compile(r"\S+\.slip_speed\b")
 
 
 def may_be_off(reason: str) -> tuple[list[str], dict[str, str]]:
@@ -299,9 +299,16 @@ def may_be_off(reason: str) -> tuple[list[str], dict[str, str]]:
 
 
 def finest(*cures: str) -> str:
-    """That of some cures which sets the smallest value, and so serves for all of them."""
+    """That of some cures which sets the smallest value, and so serves for all of them; of slip
+    speeds with the cables of all.
+
+    >>> finest("set a.slip_speed = 2e-05 m/s", "set b.slip_speed = 1e-05 m/s")
+    'set a.slip_speed and b.slip_speed = 1e-05 m/s'
+    """
     values = [float(value[1]) if (value := _VALUE.search(cure)) else math.inf for cure in cures]
-    return cures[values.index(min(values))]
+    least = cures[values.index(min(values))]
+    speeds = dict.fromkeys(path for cure in cures for path in _SLIP.findall(cure))
+    return re.sub(r"set .* =", f"set {' and '.join(speeds)} =", least) if speeds else least
 
 
 def without_doubts(reason: str) -> str:
