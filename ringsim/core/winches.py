@@ -80,8 +80,9 @@ class Answering(NamedTuple):
     """Of the step before its length (s; 0 behind a jump), rope wound and path given free (m),
     (ropes, 3)."""
     balance: Array
-    """Speed of all its winches at which they last balanced a rope (m/s), and how fast their excess
-    over the commands rose there, (ropes, 2)."""
+    """Speed of all its winches at which they last balanced a rope (m/s), how fast their excess over
+    the commands rose there, and both of the speed by which the first is the faster one,
+    (ropes, 4)."""
     asked: Array
     """What was asked last, (ropes, 5)."""
     limits: Array
@@ -113,7 +114,7 @@ class Answering(NamedTuple):
         cables, count, pulleys = len(ropes.points_per_cable), len(ropes.starts), len(ropes.behind)
         ends = cables, 2
         shapes = [
-            (2, *ends), (2, *ends), (2, count), (1,), (count, 2), (count, 3), (count, 2),
+            (2, *ends), (2, *ends), (2, count), (1,), (count, 2), (count, 3), (count, 4),
             (count, 5), (*ends, 2), (*ends, 2), (*ends, 2), ends, ends, (ropes.spans,), (pulleys,),
             (pulleys,), (pulleys,), (ropes.spans,), (7,),
         ]  # fmt: skip
@@ -359,7 +360,8 @@ class Winches:
         for k, laws in by_rope.items():
             path, length = self._begun[k] = float(paths[k]), float(natural[k])
             table.began[k] = path, length
-            table.balance[k] = sum(float(state.wound_rate[place]) for place in laws), 1.0
+            speeds = [float(state.wound_rate[place]) for place in sorted(laws)]
+            table.balance[k] = sum(speeds), 1.0, speeds[0] - speeds[-1], 1.0
             if last > 0.0 and k in begun and all(past.get(p) is law for p, law in laws.items()):
                 wound, (from_path, from_length) = sum(float(moved[p]) for p in laws), begun[k]
                 table.past[k] = last, wound, from_path - path - (from_length - length - wound)

@@ -54,7 +54,7 @@ def rope() -> Any:
 def found(excess: Callable[[float], float], guess: float, gain: float) -> tuple[float, float]:
     """Where a function is zero by the search, and how fast it rises there."""
     winches, table = rope()
-    table.balance[0] = guess, gain
+    table.balance[0, :2] = guess, gain
     with commanding(lambda v: v - excess(v)):
         speed = winches.at(STEP, np.array([PATH]), np.zeros(1))[1]
     return float(speed[0, 0]), float(table.balance[0, 1])
@@ -200,6 +200,39 @@ def test_two_winches_of_a_rope_answer_together() -> None:
     # 250 N stop a motor that turns at 0.008 m/s without a load.
     tension = float(case.state().winch_tensions[0, 0])
     assert first == pytest.approx(0.008 * (1.0 - tension / 250.0), rel=1e-3)
+
+
+def test_unlike_winches_of_a_rope_need_few_questions() -> None:
+    """Where the stronger one is at its limit and the weaker one is held back by its rope: a search
+    that halves asked some 300 times, and as often for each iteration of a step."""
+    asked = []
+    law = StallWinding.command
+
+    def counted(self: StallWinding, tension: float, reading: WinchReading) -> float:
+        asked.append(tension)
+        return law(self, tension, reading)
+
+    winch = Winch(winding=StallWinding(speed=0.008, max_tension=200.0))
+    weaker = Winch(winding=StallWinding(speed=0.006, max_tension=150.0))
+    case = still(
+        [[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 1, 0]], 0.0038, rate=(0.005, 0.002),
+        axial_stiffness=1e5, friction=FRICTION["bearing"], slip_speed=1e-4, winch=winch,
+        far_winch=weaker, end="both",
+    )  # fmt: skip
+    winches, state = Winches(case.chain.cables), case.state()
+    winches.advance(0.0, state, np.zeros(1))
+    counts = []
+    with patch.object(StallWinding, "command", counted):
+        for longer in (0.0, 1e-6, 2e-6):
+            case.wound[:], case.wound_rate[:] = winches.at(
+                0.01, state.paths * (1.0 + longer), state.path_rates
+            )
+            counts.append(len(asked))
+            asked.clear()
+    assert case.wound_rate[0, 0] == pytest.approx(0.008, rel=1e-9)
+    assert 0.0 < case.wound_rate[0, 1] < 0.006
+    assert counts[0] <= 200
+    assert max(counts[1:]) <= 40
 
 
 def test_a_fault_leaves_what_winches_have_wound() -> None:

@@ -5,8 +5,10 @@
 /* Change of path in m by which the answer of the winches to the structure is measured: a hundred
    million roundings of a path of 1 m, and still a force of 1e-3 N at EA = 1e5 N. */
 static const D NUDGE = 1e-8;
-/* Secants before the bracket is halved: from the last answer three or four are enough. */
-enum { SECANTS = 8 };
+/* Secants before it is searched between both sides: from the last answer three or four are enough. */
+enum { SECANTS = 6 };
+/* One try in this many halves what is left, where bends and roundings lead a line astray. */
+enum { HALVING = 4 };
 /* Speeds (m/s, and relative) that are one: over a step of 0.1 s they wind 1e-14 m more or less, of
    which a rope of EA = 1e5 N takes no notice (1e-10 N). */
 static const D SAME = 1e-15, ALIKE = 1e-11;
@@ -16,6 +18,10 @@ enum { TENSION, PATH_RATE, PATH_SLOPE, TIME, LAGGING, LAG, SAID };
 /* What is asked of a winch: the speed that its law commands, or ln(eta) of all pulleys at the speeds
    that are foreseen. */
 enum { COMMAND, DECAYS, QUESTIONS };
+
+/* Places of balance: the speed of all winches of a rope, by how much the first is the faster one, and
+   how fast the excess of either rose there. */
+enum { TOTAL, TOTAL_GAIN, APART, APART_GAIN, BALANCE };
 
 /* Times (s) for which a speed and its mean in the step before count, and these means of the rope
    wound and of the path given free, m/s. */
@@ -102,6 +108,44 @@ static bool ratios_at(const Asked *asked, const D *speeds, D *ratios) {
     return true;
 }
 
+/* A search for the zero of what rises by at least its argument: where it is tried next, how fast it
+   rises there, what it is on either side (0 if not known), and where it was tried before. */
+typedef struct {
+    D at, gain, low, high, below, above, from, before;
+    I tries;
+} Search;
+
+static Search search_from(D guess, D gain, D low, D high) {
+    return (Search){.at = fmin(fmax(guess, low), high), .gain = gain, .low = low, .high = high};
+}
+
+/* Whether a search ends with what it has found at its place, of speeds of a size (m/s).
+
+   By secants: an iteration or a step ago the answer was nearly the same.  Where bends lead these
+   astray, by lines from side to side; that of a side that stays counts half (Illinois). */
+static bool ends(Search *search, D over, D size) {
+    D same = SAME + ALIKE * size, way = search->at - search->from;
+    bool lies_above = over > 0.0, stays = search->tries && lies_above == (search->before > 0.0);
+    if (lies_above) search->high = search->at, search->above = over;
+    else search->low = search->at, search->below = over;
+    if (stays) *(lies_above ? &search->below : &search->above) *= 0.5;
+    D left = search->high - search->low;
+    if (fabs(over) <= same || left <= 2.0 * same) return true;
+    if (search->tries && way != 0.0) search->gain = fmax((over - search->before) / way, 1.0);
+    search->from = search->at, search->before = over;
+    I k = search->tries++;
+    /* Never a shorter way, so that the root is passed and held from both sides: a step that is short
+       since the gain was too large proves nothing. */
+    if (k < SECANTS) search->at -= copysign(fmax(fabs(over) / search->gain, same), over);
+    else if (k % HALVING == 0 || search->below == 0.0 || search->above == 0.0)
+        search->at = search->low + 0.5 * left;
+    else
+        search->at = fmin(fmax(search->low + left * search->below / (search->below - search->above),
+                               search->low + same), search->high - same);
+    search->at = fmin(fmax(search->at, search->low), search->high);
+    return false;
+}
+
 /* What the laws of a rope's winches command, into found, where these turn at speeds (m/s) and the
    rope has a mean tension (N). */
 static I command(const Asked *asked, const D *at, D mean) {
@@ -130,24 +174,18 @@ static I command_both(const Asked *asked, D total, D mean) {
     const Answering *own = asked->own;
     const I *winch = asked->winches;
     const D *limits[] = {own->limits.at + 2 * winch[0], own->limits.at + 2 * winch[1]};
-    D low = limits[0][0] - limits[1][1], high = limits[0][1] - limits[1][0], gain = 1.0;
-    D apart = own->speeds.at[2 * winch[0]] - own->speeds.at[2 * winch[1]], from = 0.0, before = 0.0;
-    apart = fmin(fmax(apart, low), high);
-    for (I k = 0;; k++) {
-        D at[] = {0.5 * (total + apart), 0.5 * (total - apart)};
+    D *balance = own->balance.at + BALANCE * asked->rope;
+    Search apart = search_from(balance[APART], balance[APART_GAIN], limits[0][0] - limits[1][1],
+                               limits[0][1] - limits[1][0]);
+    for (;;) {
+        D at[] = {0.5 * (total + apart.at), 0.5 * (total - apart.at)};
         I how = command(asked, at, mean);
         if (how != BALANCED) return how;
-        D over = apart - (own->found.at[winch[0]] - own->found.at[winch[1]]);
-        D same = SAME + ALIKE * fmax(fabs(total), fabs(apart));
-        *(over > 0.0 ? &high : &low) = apart;
-        if (fabs(over) <= same || high - low <= 2.0 * same) return BALANCED;
-        /* It rises by at least the difference itself, as in ``search``. */
-        if (k && apart != from) gain = fmax((over - before) / (apart - from), 1.0);
-        before = over, from = apart;
-        D way = fmax(fabs(over) / gain, same);
-        apart = k < SECANTS ? fmin(fmax(apart - copysign(way, over), low), high)
-                            : 0.5 * (low + high);
+        D over = apart.at - (own->found.at[winch[0]] - own->found.at[winch[1]]);
+        if (ends(&apart, over, fmax(fabs(total), fabs(apart.at)))) break;
     }
+    balance[APART] = apart.at, balance[APART_GAIN] = apart.gain;
+    return BALANCED;
 }
 
 /* How much faster the winches of a rope turn at a speed (m/s) of all than their laws command. */
@@ -161,36 +199,12 @@ static I excess(const Asked *asked, D total, D *over) {
     return how == BALANCED && isnan(*over) ? ENDLESS : how;
 }
 
-/* Where the excess is zero, from a guess and how fast it rises there: it rises by at least the speed.
-
-   By secants: an iteration or a step ago the answer was nearly the same.  Halves of the bracket decide
-   where bends lead secants astray. */
-static I search(const Asked *asked, D low, D high, D *total, D *gain, D *over) {
-    D at = fmin(fmax(*total, low), high);
-    I how = excess(asked, at, over);
-    for (I k = 0; how == BALANCED; k++) {
-        D same = SAME + ALIKE * fabs(at), before = *over, from = at;
-        *(before > 0.0 ? &high : &low) = at;
-        if (fabs(before) <= same || high - low <= 2.0 * same) {
-            *total = at;
-            return BALANCED;
-        }
-        /* Never a shorter way, so that the root is passed and held from both sides: a step that is
-           short since the gain was too large proves nothing. */
-        D way = fmax(fabs(before) / *gain, same);
-        at = k < SECANTS ? fmin(fmax(at - copysign(way, before), low), high) : 0.5 * (low + high);
-        how = excess(asked, at, over);
-        if (k < SECANTS) *gain = fmax((*over - before) / (at - from), 1.0);
-    }
-    return how;
-}
-
 /* The speeds of the winches that answer to a rope, into found. */
 static I answer(const Asked *asked) {
     const Answering *own = asked->own;
     const D question[] = {own->elapsed.at[0], asked->path.length, asked->path.rate, asked->natural,
                           asked->rest};
-    D *known = own->asked.at + 5 * asked->rope, *balance = own->balance.at + 2 * asked->rope;
+    D *known = own->asked.at + 5 * asked->rope, *balance = own->balance.at + BALANCE * asked->rope;
     D low = 0.0, high = 0.0, over = 0.0;
     bool same = true;
     /* A tangent asks what its residual has asked. */
@@ -201,12 +215,16 @@ static I answer(const Asked *asked) {
         const D *limits = own->limits.at + 2 * asked->winches[k];
         low += limits[0], high += limits[1];
     }
-    I how = search(asked, low, high, balance, balance + 1, &over);
-    if (how != BALANCED) return how;
+    Search total = search_from(balance[TOTAL], balance[TOTAL_GAIN], low, high);
+    do {
+        I how = excess(asked, total.at, &over);
+        if (how != BALANCED) return how;
+    } while (!ends(&total, over, fabs(total.at)));
+    balance[TOTAL] = total.at, balance[TOTAL_GAIN] = total.gain;
     /* Steep commands amplify the last bits of the total: share these out. */
     for (I k = 0; k < asked->count; k++) {
         D *found = own->found.at + asked->winches[k];
-        *found = asked->count == 1 ? balance[0] : *found + over / (D)asked->count;
+        *found = asked->count == 1 ? total.at : *found + over / (D)asked->count;
     }
     memcpy(known, question, sizeof question);
     return BALANCED;
@@ -244,7 +262,7 @@ I turn_winches(const Answering *own, const RopeTable *ropes, Ask ask) {
         if (!asked.count) continue;
         I how = answer(&asked);
         if (how != BALANCED) return how;
-        D total = own->balance.at[2 * rope];
+        D total = own->balance.at[BALANCE * rope];
         /* All share what they wind together by their speeds. */
         D lasting = total == 0.0 ? own->elapsed.at[0] : wound_by(&asked.weights, total) / total;
         for (I k = 0; k < asked.count; k++) {
@@ -270,7 +288,7 @@ I find_left(const Answering *own, const RopeTable *ropes, Ask ask, D *left, I n)
             asked.follow = -takeup_of(&asked);
             I how = answer(&asked);
             if (how != BALANCED) return how;
-            wound[k] = wound_by(&asked.weights, own->balance.at[2 * rope]);
+            wound[k] = wound_by(&asked.weights, own->balance.at[BALANCE * rope]);
         }
         left[rope] = fmin(fmax(1.0 + (wound[1] - wound[0]) / NUDGE, 0.0), 1.0);
     }
