@@ -234,10 +234,14 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
             f"{min(bounds):.2g} m/s"
         )
     else:
+        # What stops short with little friction does so with all of it.
+        off = "asynchrony_max, peak_tension"
+        if np.isfinite(values["deployment_time"]):
+            off = "asynchrony_max, deployment_time, outcome, peak_tension"
         remark = (
             f"; {SMOOTHED}: the ring moves too easily, and tensions are up to {max(excesses):.0f} "
-            "% too high far from the winch and may be too low near it, so asynchrony_max, "
-            f"peak_tension may be off: set {' and '.join(faded)} = {min(bounds):.2g} m/s"
+            f"% too high far from the winch and may be too low near it, so {off} may be off: set "
+            f"{' and '.join(faded)} = {min(bounds):.2g} m/s"
         )
     return replace(outcome, reason=outcome.reason + remark)
 

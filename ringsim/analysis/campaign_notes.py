@@ -571,8 +571,9 @@ def off_note(says: Mapping[Any, Any]) -> str:
     (first, count), *others = told["samples"].items()
     more = "".join(f", {name} in {number}" for name, number in others)
     of = counted(told["of"], "sample")
-    cures = " and ".join(told["cures"].values())
-    return f"{_doubted(told['cures'])}: {first} in {count} of {of}{more}; {cures}"
+    each = [f"where {cause}, {cure}" for cause, cure in told["cures"].items()]
+    cure = "; ".join(each if len(each) > 1 else told["cures"].values())
+    return f"{_doubted(told['cures'])}: {first} in {count} of {of}{more}; {cure}"
 
 
 def _doubted(causes: Iterable[str]) -> str:

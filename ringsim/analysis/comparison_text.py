@@ -156,7 +156,7 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
     for some, sense in (
         (turned, "turn round: samples that are bad in one are good in the other"),
         (tend, "tend to turn round: samples that are bad in one are rather good in the other"),
-        (apart, "go together weakly: which samples are bad in one tells little of the other"),
+        (apart, "hardly go together: which samples are bad in one tells little of the other"),
     ):
         if some:
             named = ", ".join(f"{name} ({each:+.2f})" for name, each in some.items())

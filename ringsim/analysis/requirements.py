@@ -292,6 +292,8 @@ def require_values(campaign: xr.Dataset, name: str, wanted: Requirement) -> None
     """Refuse (InputError) an output that the runs do not compute, and more V-joints than they have:
     the requirement would seem violated.
     """
+    if name not in campaign and not good(campaign).any():
+        raise InputError(f"requirement on {name}: no sample has numbers that hold yet")
     if name not in campaign:
         known = [OUTCOME, *(each for each in quantities() if each in campaign)]
         raise InputError(

@@ -68,9 +68,7 @@ class Verdict(Code):
     """The design stands for no population: only violations can be counted."""
 
 
-def bounds(
-    kept: Mask, samples: NDArray[np.int64], levels: Levels, placed: Placement
-) -> Interval:  # fmt: skip
+def bounds(kept: Mask, samples: NDArray[np.int64], levels: Levels, placed: Placement) -> Interval:
     """One-sided bounds of the probability that samples keep to a requirement.
 
     ``levels`` are the confidence of the lower and of the upper one.  Those after Clopper and
@@ -104,26 +102,27 @@ def judge(
     doubted = doubtful(campaign)[0] if requirements else {}
     for name, wanted in requirements.items():
         require_values(campaign, name, wanted)
-        off = doubted.get(name, none)
+        off, unsure = doubted.get(name, none), none
         if name == LATCHED:  # so many more or fewer may have caught; mostly both tell of the same
             latches = np.maximum(uncertain_latches(campaign), slow_latches(campaign))
-            off = off | (latches > np.abs(wanted.beyond(numbers(campaign, name))))
+            unsure = latches > np.abs(wanted.beyond(numbers(campaign, name)))
         if name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word:
-            off = off | open_outcomes(campaign)
-        for key, value in _judged(campaign, name, wanted, placed, rule, off).items():
+            unsure = open_outcomes(campaign)
+        found = _judged(campaign, name, wanted, placed, rule, off | unsure)
+        for key, value in (found | {"samples_unsure": (good(campaign) & unsure).sum()}).items():
             columns[key].append(value)
     known = {
         name: ("requirement", np.array(columns[name], dtype=kind), about(words))
         for name, (words, kind) in _MEANING.items()
     }
     told = [each.told(name) for name, each in requirements.items()]
-    found = xr.Dataset(known, coords={"requirement": np.array([*requirements], dtype=object)})
-    found["requirement_text"] = (
+    table = xr.Dataset(known, coords={"requirement": np.array([*requirements], dtype=object)})
+    table["requirement_text"] = (
         "requirement", np.array(told, dtype=object), {"long_name": "requirement in words"}
     )  # fmt: skip
     for name in ("verdict", "verdict_of_used"):
-        found[name].attrs |= flags_of(Verdict)
-    return found.assign(_together(campaign, requirements, placed, rule))
+        table[name].attrs |= flags_of(Verdict)
+    return table.assign(_together(campaign, requirements, placed, rule))
 
 
 def _together(
@@ -187,6 +186,7 @@ _MEANING = {
         "samples used whose value may be off, by what their runs say, or that are closer to the "
         "limit than the numerical error", "i8"),
     "samples_close": ("of these, samples closer to the limit than the numerical error", "i8"),
+    "samples_unsure": ("of these, samples that latches decide which may or may not catch", "i8"),
     "numerical_error": (
         "error bar that samples without one take from those that ended alike, in the median",
         "f8"),
@@ -334,8 +334,7 @@ def verdict_about(analysis: xr.Dataset, name: str) -> dict[str, Any]:
 
 def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
     """Why a verdict may change, and what settles it."""
-    close, others = one["samples_close"], one["samples_may_be_off"] - one["samples_close"]
-    told = []
+    close, unsure, told = one["samples_close"], one["samples_unsure"], []
     if close:
         error = with_unit(number_text(one["numerical_error"], 2), quantities()[name].units)
         told.append(
@@ -344,9 +343,9 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
             "square of those that ended alike, of all if that is more and fewer than three have "
             "one): smaller steps, or more elements, settle it"
         )
-    if others and name in (OUTCOME, LATCHED):
+    if unsure:
         told.append(
-            f"{name}: in {counted(others, 'sample')} it is uncertain whether all latches catch, as "
+            f"{name}: in {counted(unsure, 'sample')} it is uncertain whether all latches catch, as "
             "another joint locks in the same step, or the rate's numerical error decides it: "
             "smaller steps settle it"
         )

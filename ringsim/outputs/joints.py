@@ -155,6 +155,12 @@ def _spread(time: float, angles: Array) -> Spread:
 
 # When the V-joints reached 180 deg.
 
+_PLACE = ("plane", "section")
+_NAMED = 3
+"""V-joints that are told by name beside the last one."""
+_AT_ONCE = 1e-9
+"""Share of the time by which joints that move alike may lock apart, by round-off."""
+
 
 class Deployment(Output):
     """The lock time of every V-joint, and the latest of them."""
@@ -184,11 +190,31 @@ class Deployment(Output):
             "locked_joints": np.isfinite(run.locks).sum(),
         }
 
+    def told(self, values: Values, span_names: SpanNames) -> str:
+        """Which V-joint locked last, with those that the error bar does not tell from it: as "last
+        lower 11 (or upper 11, by the error bar)"; empty if that is not known.
+        """
+        if any(name not in values for name in ("lock_time", *_PLACE)):
+            return ""
+        locks = np.asarray(values["lock_time"])
+        last, bar = locks.max(), float(values.get("deployment_time_error", np.nan))
+        near = locks >= last - (bar if bar < math.inf else _AT_ONCE * last)
+        if near.all() or not near.any():
+            return "all at once" * bool(near.any())
+        order = np.argsort(-locks, axis=None, kind="stable")[: near.sum()]
+        where = [np.asarray(values[name])[k] for name, k in
+                 zip(_PLACE, np.unravel_index(order, locks.shape), strict=True)]  # fmt: skip
+        names = [f"{plane} {section}" for plane, section in zip(*where, strict=True)]
+        first, *others = names
+        others[_NAMED:] = [f"{len(others) - _NAMED} more"] * (len(others) > _NAMED)
+        if bar < math.inf:
+            return f"last {first}" + f" (or {', '.join(others)}, by the error bar)" * bool(others)
+        return f"last {' and '.join([first, ', '.join(others)][: 1 + bool(others)])}"
+
 
 # How fast V-joints met their latches, and which of these caught.
 
 
-_PLACE = ("plane", "section")
 LEAST = Peak("least_latch_rate", _PLACE, "the smallest latch rate", "opening_angle")
 LARGEST = Peak("peak_latch_rate", _PLACE, "the largest latch rate", "opening_angle")
 

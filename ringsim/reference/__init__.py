@@ -64,6 +64,8 @@ WORDS = {
     "prior": "what is known of an unknown before the test: its distribution in the file",
     "rank correlation": "correlation of the ranks of an input and an output (Spearman): 1 or -1 if "
     "one grows or falls with the other, however bent",
+    "rank correlation of pairs": "correlation of the ranks of an output in both samples of each "
+    "pair: near 1 samples that are bad on one side are so on the other",
     "remaining scatter": "the posterior's standard deviation over the prior's, of the normal "
     "variable behind the law: 1 where the data tell nothing",
     "rms / sigma": "root mean square of measured less computed over the standard deviation of a "
@@ -90,6 +92,10 @@ WORDS = {
     "worst sample": "the one whose output is farthest to the side that is bad for an antenna",
     "worst of": "the samples in which a requirement or an outcome is missed by most, the worst "
     "first",
+    "worse in": "the side of a comparison that is worse in the output: where the 95 % interval of "
+    "the difference leaves out zero; - where it does not, where less than 0.1 % or the numerical "
+    "error is between the two, or where an output has no bad side",
+    "+-": "numerical error bar, from a second run with half the steps and twice the elements",
     "?": "runs call the number uncertain themselves, because their steps at locks were too long, "
     "or their pulley friction was smoothed away; a line tells what cures it",
     "*": "runs that failed depend on inputs: the others, of which the number is, are another "

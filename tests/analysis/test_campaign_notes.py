@@ -26,6 +26,7 @@ from ringsim.analysis.verdicts import verdict_table
 from ringsim.analysis.worst import margin_table
 from ringsim.outputs.base import SMOOTHED
 from ringsim.plots.figures import figures_of
+from ringsim.refusal import InputError
 from ringsim.report.dossier import reached_by_words
 from ringsim.variables import Fate, Status
 
@@ -165,13 +166,32 @@ def test_friction_that_is_smoothed_away_is_told_beside_steps_that_are_too_long()
     slow = "much of the pulley friction is smoothed away"
     assert since == f"? may be off, since steps are too long at locks or {slow}"
     assert more == (
-        "peak_tension in 3 of 6 samples; set solver.tolerance = 1.0e-04 (2 to 3 times the steps) "
-        "and set cables.upper.slip_speed = 4.0e-07 m/s"
+        "peak_tension in 3 of 6 samples; where steps are too long at locks, set solver.tolerance = "
+        f"1.0e-04 (2 to 3 times the steps); where {slow}, set cables.upper.slip_speed = 4.0e-07 m/s"
     )
     assert not remark_lines(made)
     found = analyse(made, {"peak_tension": {"max": 100.0, "probability": 0.5, "confidence": 0.6}})
     (row,) = verdict_table(found).rows
     assert row[1] == "met, if its numbers hold: may be off in 3 of 6 samples"
+
+
+def test_an_outcome_may_be_off_by_smoothed_friction_without_a_latch_in_doubt() -> None:
+    """The verdict hangs on it, and no line says that latches decide it."""
+    made = with_doubts(made_campaign(6), {})
+    reasons = made["reason"].to_numpy()
+    reasons[:4] += f"; {SMOOTHED}: it moves too easily, so outcome may be off: set a.slip_speed = 1"
+    wanted = {"outcome": {"is": "deployed", "probability": 0.5, "confidence": 0.6}}
+    found = analyse(made, wanted)
+    (row,) = verdict_table(found).rows
+    assert row[1] == "met, if its numbers hold: may be off in 4 of 6 samples"
+    assert found["samples_unsure"].item() == 0
+    assert "latches catch" not in "\n".join(all_told(found))
+
+
+def test_a_requirement_before_any_sample_holds_says_so() -> None:
+    made = made_campaign(3, failed=(0, 1, 2)).drop_vars("peak_tension")
+    with pytest.raises(InputError, match="peak_tension: no sample has numbers that hold yet"):
+        analyse(made, {"peak_tension": {"max": 1.0, "probability": 0.5, "confidence": 0.6}})
 
 
 def test_a_verdict_says_so_if_what_may_be_off_could_change_it() -> None:

@@ -387,7 +387,7 @@ def test_verdicts_on_requirements_whose_limits_differ_are_told():
         (9.0 - VALUES, "turn round"),
         (
             np.random.default_rng(3).random(COUNT),
-            "go together weakly: which samples are bad in one tells little of the other",
+            "hardly go together: which samples are bad in one tells little of the other",
         ),
         (-0.5 * VALUES + 2.0 * np.random.default_rng(4).random(COUNT), "tend to turn round"),
         (5.0 + 1e-4 * VALUES, ""),  # all the same to the digits that are told

@@ -9,7 +9,7 @@ import pytest
 
 from driven import outcome, truss
 from ringsim.outputs.base import SMOOTHED, may_be_off
-from ringsim.scene import Scene
+from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run_frame
 from ringsim.variables import Fate
 
@@ -71,6 +71,19 @@ def test_friction_that_is_mostly_smoothed_away_is_told_as_such() -> None:
     assert names == ["asynchrony_max", "peak_tension"]
     both = "cables.upper.slip_speed and cables.lower.slip_speed"
     assert cures == {SMOOTHED: f"set {both} = 8.3e-08 m/s"}
+
+
+def test_that_a_ring_opens_is_in_doubt_where_friction_was_smoothed_away() -> None:
+    """Its time, too; what stops short with little friction does so with all of it."""
+    slips = {f"cables.{plane}.slip_speed": 0.1 for plane in ("upper", "lower")}
+    scene = load_scene("ring18-motor").with_values(slips | {"structure.sections": 6})
+    found = run_frame(scene)
+    assert found.fate is Fate.DEPLOYED
+    names, _ = may_be_off(found.reason)
+    assert names == ["asynchrony_max", "deployment_time", "outcome", "peak_tension"]
+    slower = run_frame(scene.with_values(dict.fromkeys(slips, 2e-4)))
+    assert SMOOTHED not in slower.reason
+    assert slower.values["deployment_time"] > found.values["deployment_time"]
 
 
 def test_smoothed_friction_is_too_low_near_the_winch_and_too_high_far_from_it() -> None:

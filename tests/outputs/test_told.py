@@ -40,6 +40,31 @@ def test_slack_is_told_from_when_on_and_where_if_there_was_some() -> None:
     assert "longest_slack" not in summary({"longest_slack": np.array(0.0)}, spans)
 
 
+def test_a_deployment_time_tells_which_joints_lock_last() -> None:
+    """Those within the error bar of the time, the latest first; the ties of joints that move alike
+    where no error is known; not all names of many."""
+    values = {
+        "deployment_time": np.array(12.0), "plane": np.array(["lower", "upper"]),
+        "section": np.arange(1, 4), "lock_time": np.array([[11.0, 11.98, 12.0], [9.0, 11.99, 8.0]]),
+    }  # fmt: skip
+
+    def told() -> str:
+        return " ".join(summary(values, {})["deployment_time"].split()[2:])
+
+    assert told() == "last lower 3"
+    values["deployment_time_error"] = np.array(0.015)
+    assert told() == "+- 0.015 last lower 3 (or upper 2, by the error bar)"
+    values["deployment_time_error"] = np.array(3.5)
+    assert told() == "+- 3.5 last lower 3 (or upper 2, lower 2, lower 1, 1 more, by the error bar)"
+    del values["deployment_time_error"]
+    values["lock_time"] = np.array([[11.0, 12.0, 12.0 - 1e-12], [9.0, 12.0, 8.0]])
+    assert told() == "last lower 2 and upper 2, lower 3"
+    values["lock_time"] = np.full((2, 3), 12.0)
+    assert told() == "all at once"
+    values["lock_time"] = np.array([[11.0, np.nan, 12.0], [9.0, 12.0, 8.0]])
+    assert told() == ""
+
+
 def test_loads_are_told_by_how_far_they_are_from_their_limits() -> None:
     limits = {"limits.tension": 40.0, "limits.rod_stress": 3e7, "record.stress": True}
     scene = load_scene("ring18-cable").with_values(limits)
