@@ -334,13 +334,9 @@ def _limits(both: Both) -> dict[str, Any]:
     shared = [path for path in paths[0] if path in paths[1]]
     places = [[own.index(path) for path in shared] for own in paths]
     one, other = (each.isel(limit=own) for each, own in zip(known, places, strict=True))
-    words, drawn = [], [by_path(each).keys() for each in both]
+    words = []
     for first, second in zip(one["limit_text"].values, other["limit_text"].values, strict=True):
-        told = first if first == second else f"{first} and {second.partition(' = ')[2]}"
-        path, _, values = told.partition(" = ")
-        if any(path in each for each in drawn):
-            told = f"{path}, drawn ({values} in these samples)"
-        words.append(told)
+        words.append(first if first == second else f"{first} and {second.partition(' = ')[2]}")
     found: dict[str, Any] = {"limit": ("limit", np.array(words, dtype=object))}
     found["limit_output"] = "limit", one["limit_output"].values, one["limit_output"].attrs
     for name in ("limit_value", "limit_margin"):

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.intervals import Mask, good
+from ringsim.analysis.intervals import Mask, good, numbers
 from ringsim.outputs.family import Array
 from ringsim.variables import Fate
 
@@ -55,6 +55,20 @@ def any_finite(campaign: xr.Dataset, name: str) -> bool:
         bool(np.isfinite(block[name].to_numpy()[good(block)]).any())
         for block in blocks(campaign, [name, "status"])
     )
+
+
+def largest(campaign: xr.Dataset, peak: str, series: str) -> Array:
+    """Largest values of a series at any time of the runs, at least those of its ``peak``, shape
+    (samples,); NaN without one.
+    """
+    found = numbers(campaign, peak)
+    if series not in campaign:
+        return found
+    rows = list[Array]()
+    for block in blocks(campaign, [series]):
+        values = block[series].transpose("sample", ...).to_numpy()
+        rows.append(np.fmax.reduce(values.reshape(len(values), -1), axis=1, initial=np.nan))
+    return np.asarray(np.fmax(found, np.concatenate(rows)), dtype=float)
 
 
 # Quantiles over samples, and how they are read for a part of the time at a time.

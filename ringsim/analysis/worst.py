@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_notes import RIGID, doubted, late_line, marked, plane_margin
+from ringsim.analysis.courses import largest
 from ringsim.analysis.design import (
     DIFFERENCE,
     FAILED_RUNS,
@@ -296,9 +297,9 @@ def worst(
     ``worst_failure`` says what failed, with ``worst_failed`` samples of ``worst_of`` that ran; then
     ``worst_sample``, ``worst_found`` (its value, or why it ended) and ``worst_inputs``, what is
     unusual in its inputs.  Violations are ordered by their distance from the bound, those without
-    a value last; outcomes by the V-joints that locked, the fewest first, or by ``_beyond``; lost
-    runs by how far they came.  ``analysis`` is the ``influence`` of the campaign, whose inputs that
-    separate a failure are named first.  InputError if a requirement cannot be judged.
+    a value last; outcomes as ``_stuck`` or ``_beyond`` has it; lost runs by how far they came.
+    ``analysis`` is the ``influence`` of the campaign, of which the inputs that separate a failure
+    are named first.  InputError if a requirement cannot be judged.
     """
     for name, wanted in requirements.items():
         require_values(campaign, name, wanted)
@@ -375,8 +376,7 @@ def _failures(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement]
 ) -> list[_Failure]:  # fmt: skip
     """All failures that happened; those of the same samples as one, with the words of both."""
-    stuck = -numbers(campaign, "locked_joints")
-    found = []
+    stuck, found = _stuck(campaign), []
     for name, wanted in requirements.items():
         badness, value = stuck, ""
         if name != OUTCOME:
@@ -388,7 +388,7 @@ def _failures(
         found.append(_Failure(words, own, badness, value, wanted.min is None if known else None))
     ends, came = endings(campaign), -numbers(campaign, "final_time")
     short = short_of_goal(ends)
-    beyond = {each.word: _beyond(campaign, each, stuck) for each in GO_ON if each.word in short}
+    beyond = {each.word: _beyond(campaign, each) for each in GO_ON if each.word in short}
     found += [_Failure(word, ends == word, beyond.get(word, stuck), "") for word in short]
     kinds = [word for word in kinds_of_ends(ends) if word.startswith(LOST)]
     found += [_Failure(word, ends == word, came, "") for word in kinds]
@@ -402,10 +402,21 @@ def _failures(
     return [*kept.values()]
 
 
-def _beyond(campaign: xr.Dataset, fate: Fate, stuck: Array) -> Array:
-    """How bad an end beyond a limit is: loads by how far they are beyond theirs, slack by the
-    joints that are ``stuck``, and its time.
+def _stuck(campaign: xr.Dataset) -> Array:
+    """How far an antenna is from what it should be: by the V-joints that have not locked, then by
+    the latches that have not caught, then by the least rate at which one was met.
     """
+    caught = np.nan_to_num(numbers(campaign, "latched_joints"))
+    slow = 1.0 / (1.0 + np.nan_to_num(numbers(campaign, "least_latch_rate")))
+    less = (caught - slow) / (2.0 + caught.max(initial=0.0))  # below 1, by which counts differ
+    return np.asarray(-numbers(campaign, "locked_joints") - less)
+
+
+def _beyond(campaign: xr.Dataset, fate: Fate) -> Array:
+    """How bad an end beyond a limit is: loads by how far they are beyond theirs, slack by the
+    V-joints that have not locked, and its time.
+    """
+    stuck = -numbers(campaign, "locked_joints")
     ratios = {path: -ratio for path, *_, ratio in _ratios(campaign)}  # reads all series
     slack = np.nan_to_num(ratios.pop(f"limits.{_SLACK[0]}", stuck), nan=-1.0)
     if fate is Fate.OVERLOADED:
@@ -478,8 +489,6 @@ def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
 
 _SLACK = ("slack_duration", "longest_slack")
 _DRIVE, _PLANE = "least_drive_margin", "least_plane_margin"
-_AT_ONCE = 64
-"""Samples whose series are read at once."""
 
 
 def margins_of(both: Sequence[xr.Dataset]) -> list[xr.Dataset]:
@@ -505,6 +514,10 @@ def margins(campaign: xr.Dataset, plane: str = "") -> xr.Dataset:
         k, units = int(np.nanargmin(ratio)), quantities()[peak].units
         bound = float(np.broadcast_to(allowed, ratio.shape)[k])
         told = f"{path} = {with_unit(f'{bound:g}', units)}"
+        if np.ptp(own := np.atleast_1d(allowed)[: len(ratio)]) > 0.0:  # each sample its own
+            ends = f"{own.min():.4g} .. {own.max():.4g}"
+            there = f"{bound:.4g} in sample {int(campaign['sample'][k])}"
+            told = f"{path} = {with_unit(ends, units)} (drawn, {there})"
         later = series and exceeded(numbers(campaign, peak)[k], values[k])
         of = f"{series} after the last lock, as recorded" if later else peak
         known = good(campaign) & np.isfinite(values)  # ropes that never were slack have 0 s of it
@@ -545,7 +558,7 @@ def _ratios(campaign: xr.Dataset) -> Iterator[tuple[str, str, str, Any, Array, A
         if peak not in campaign or (path not in scene and path not in own):
             continue
         allowed = numbers(campaign, own[path]) if path in own else float(scene[path])
-        values = _largest(campaign, peak, series)
+        values = largest(campaign, peak, series)
         loaded = np.where(good(campaign) & (values > 0.0), values, np.nan)
         ratio = np.asarray(allowed / loaded - 1.0)
         if np.isfinite(ratio).any():
@@ -559,19 +572,6 @@ def _limited() -> Iterator[tuple[str, str, str]]:
             if one.largest_of == output.variables[0].name:
                 yield output.limit, one.name, output.variables[0].name
     yield *_SLACK, ""
-
-
-def _largest(campaign: xr.Dataset, peak: str, series: str) -> Array:
-    """Largest values at any time of the runs, shape (samples,); NaN without one."""
-    found = numbers(campaign, peak)
-    if series not in campaign:
-        return found
-    for first in range(0, len(found), _AT_ONCE):
-        rows = slice(first, first + _AT_ONCE)
-        values = campaign[series].isel(sample=rows).transpose("sample", ...).to_numpy()
-        flat_rows = values.reshape(len(values), -1)
-        found[rows] = np.fmax(found[rows], np.fmax.reduce(flat_rows, axis=1, initial=np.nan))
-    return found
 
 
 def margin_table(analysis: xr.Dataset) -> Table:

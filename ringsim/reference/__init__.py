@@ -70,7 +70,8 @@ WORDS = {
     "variable behind the law: 1 where the data tell nothing",
     "rms / sigma": "root mean square of measured less computed over the standard deviation of a "
     "reading: about 1 where the run explains the data",
-    "samples beyond": "samples whose value is beyond the limit of the scene",
+    "samples beyond": "samples whose value is beyond the limit of the scene, each beyond its own "
+    "where it is drawn",
     "samples to go": "how many more samples, none of them violating, would show the requirement",
     "samples used": "samples whose run holds and has a value of the output",
     "separation": "of all pairs of a sample in the group and one outside, the share in which the "

@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import campaign_notes as notes
+from ringsim.analysis.design import by_path
 from ringsim.analysis.intervals import good, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.study_text import outcome_table, unit_of
@@ -180,6 +181,19 @@ def verdicts(of: Of, name: str = "") -> Answer:
         )
     recorded = notes.records_line(of.campaign, judged) if judged else ""
     return found + Answer(evidence=[recorded] * bool(recorded))
+
+
+def field_text(of: Of, path: str) -> str:
+    """A field of the scene as the samples have it: its value, or what is drawn of it."""
+    known = by_path(of.campaign)
+    if path in known:
+        values = of.campaign[known[path]].to_numpy()
+        if values.dtype.kind in "OU":
+            return f"drawn ({', '.join(sorted({str(v) for v in values.ravel().tolist()}))})"
+        return f"{number_text(values.min(), 4)} .. {number_text(values.max(), 4)} (drawn)"
+    if any(path.startswith(f"{each}.") for each in known):
+        return "drawn"
+    return show(of.scene[path]) + ", drawn in part" * any(e.startswith(f"{path}[") for e in known)
 
 
 def drawn_lines(of: Of, chosen: Callable[[str, str], bool]) -> list[str]:

@@ -35,7 +35,7 @@ from ringsim.measured import Measurement
 from ringsim.outputs.balance import rules
 from ringsim.outputs.family import Array
 from ringsim.overrides import flat
-from ringsim.refusal import InputError, show
+from ringsim.refusal import InputError
 from ringsim.report.answers import (
     Answer,
     Ask,
@@ -45,6 +45,7 @@ from ringsim.report.answers import (
     drawn_lines,
     evidence_of,
     fates,
+    field_text,
     outputs,
     verdicts,
 )
@@ -250,7 +251,7 @@ def _drive(of: Of) -> Answer:
     if later in of.analysis and (late or verdicts(of, later).result):
         values = numbers(of.campaign, later)[held]
         found += outputs(**{later: ""})(of) + Answer([f"{later}: {_below_zero(values)}"])
-    own = ((path, show(v)) for path, v in of.scene.items() if path.startswith("margin."))
+    own = ((path, field_text(of, path)) for path in of.scene if path.startswith("margin."))
     factors = (f"{path.removeprefix('margin.').replace('_', ' ')} {told}" for path, told in own)
     found.evidence.append(f"static margin at all angles passed; {', '.join(factors)}")
     if kind != wanted:
@@ -269,9 +270,8 @@ def _latching(of: Of) -> Answer:
     found = outputs(latched_joints="stop.latch = true", least_latch_rate="")(of)
     if found.result:
         found.result = [line for line in fates(of) if line.startswith(REACHED)] + found.result
-        if rate := of.scene.get("latch.min_rate"):
-            drawn = ", as drawn" * ("latch.min_rate" in by_path(of.campaign))
-            found.evidence.append(f"a latch catches from {show(rate)} rad/s on{drawn}")
+        if of.scene.get(rate := "latch.min_rate") or rate in by_path(of.campaign):
+            found.evidence.append(f"a latch catches from {field_text(of, rate)} rad/s on")
         others = _temperature(of).lacks | _tolerances(of).lacks
         found.lacks |= {what: others[what] for what in others if what.startswith("scatter")}
     return found
@@ -285,7 +285,7 @@ def _cases(of: Of) -> Answer:
     else:
         found.lacks[_EXTREMES] = f'design {kind} meets them by chance; "grid" or "list" places them'
     ground = [
-        f"{path} = {show(value)}"
+        f"{path} = {field_text(of, path)}"
         for path, value in of.scene.items()
         if path.startswith(("gravity.", "offload.")) and value != []  # no corners named: all
     ]

@@ -140,6 +140,38 @@ def test_rings_over_a_limit_of_slack_are_ordered_by_it_and_may_open_all_the_same
     assert any("1 of the 8 samples that meet it ended before" in line for line in told(found))
 
 
+def test_rings_that_did_not_latch_are_ordered_by_their_latches_then_by_their_rates() -> None:
+    """All V-joints of samples 2 to 7 have come to 180 deg; where as many latches have missed, the
+    slower one is the worse; a ring that stalled comes first."""
+    made = made_campaign(8, stalled=(1,))
+    joints = np.where(np.arange(8) == 1, 12, 36)
+    rates = np.array([0.5, 0.5, 0.09, 0.08, 0.07, 0.06, 0.05, 0.04])
+    made["locked_joints"] = "sample", joints
+    made["latched_joints"] = "sample", joints - np.array([0, 0, 1, 2, 1, 2, 1, 1])
+    made["least_latch_rate"] = "sample", rates
+    fate = made["outcome"].to_numpy().copy()
+    fate[2:] = int(Fate.NOT_LATCHED)
+    made["outcome"] = "sample", fate
+    found = analyse(made, {"outcome": {"is": "deployed", **BOUND}})
+    samples = {
+        each.title.partition(" (")[0]: [row[0] for row in each.rows]
+        for each in worst_tables(found, "f")
+    }
+    assert samples["not latched"] == ["5", "3", "7"]
+    assert samples["violates outcome is deployed"] == ["1", "5", "3"]
+
+
+def test_a_limit_that_is_drawn_is_told_as_such() -> None:
+    """Sample k peaks at 20 + k N and may have 30 - k N: 6 and 7 are beyond their own limits, though
+    only 7 is beyond that of 6."""
+    made = with_limits(made_campaign(8), tension=200.0)
+    says = {"role": "input", "path": "limits.tension", "units": "N", "distribution": "{}"}
+    made["limits_tension"] = "sample", 30.0 - np.arange(8.0), says
+    (row,) = margin_table(analyse(made)).rows
+    told_of = "limits.tension = 23 .. 30 N (drawn, 23 in sample 7)"
+    assert row == (told_of, "peak_tension", "27 N", "-0.148: NOT enough", "7", "2 of 8")
+
+
 def test_ropes_that_never_were_slack_count_as_within_the_limit() -> None:
     slack = np.zeros(8)
     slack[[2, 5]] = 3.0, 0.5

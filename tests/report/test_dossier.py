@@ -22,6 +22,7 @@ from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.report import dossier as subject
 from ringsim.report import shell
 from ringsim.report.dossier import ECSS, HEAD, NASA, STATES, Answer, Of, dossier, item
+from ringsim.scene import load_scene
 from test_numbers_told import COUNT, made, near
 from told_numbers import (
     File,
@@ -349,6 +350,33 @@ def test_rates_of_latches_by_section_and_antennas_without_cables_are_told() -> N
 
 
 @pytest.mark.quick
+def test_a_field_that_is_drawn_is_told_as_it_was_drawn() -> None:
+    """Not as the scene has it: factors of the margin, the rate of latches, the lines of a stand."""
+    campaign = with_motors(made_campaign(6))
+    campaign["least_drive_margin_time"] = campaign["least_drive_margin"] * 0.0
+    campaign["least_drive_margin_angle"] = campaign["least_drive_margin_time"] + 20.0
+    campaign["latched_joints"] = "sample", [36] * 6
+    scene = load_scene("ring18-motor").with_values(
+        {"latch": {"peak_torque": 0.1, "min_rate": 0.01}, "gravity.vector": [0.0, 0.0, -9.81],
+         "offload": {"planes": "upper", "friction": 0.002}}
+    )  # fmt: skip
+    campaign.attrs["scene"] = scene.to_toml()
+    for path, low, high in (
+        ("latch.min_rate", 0.04, 0.05),
+        ("margin.friction", 1.5, 2.0),
+        ("offload.friction", 0.004, 0.006),
+    ):
+        says = {"role": "input", "path": path, "units": "1", "distribution": "{}"}
+        campaign[path.replace(".", "_")] = "sample", np.linspace(low, high, 6), says
+    rows = rows_of(campaign)
+    told = row(rows, "Latching or locking")["evidence"]
+    assert "a latch catches from 0.04 .. 0.05 (drawn) rad/s on" in told
+    assert "friction 1.5 .. 2 (drawn)" in row(rows, "(motorization)")["evidence"]
+    told = row(rows, "4.8.2.1 Cases")["result"]
+    assert "offload.friction = 0.004 .. 0.006 (drawn)" in told
+    assert 'offload.planes = "upper"' in told
+
+
 def test_temperatures_are_told_with_what_became_of_the_antennas_and_remarks_of_runs_too() -> None:
     campaign = made_campaign(4)
     law = json.dumps({"kind": "uniform", "low": 210.0, "high": 310.0})
