@@ -433,7 +433,8 @@ def _unlike_ends(found: xr.Dataset) -> list[str]:
         kind for kind in found["kind"].values.tolist()
         if not kind.startswith(LOST) and kind not in (UNKNOWN, NOT_RUN)
     ])  # fmt: skip
-    goals = [kind for kind in ran["kind"].values.tolist() if kind in REACHED]
+    # Rings that did not latch have come all the way.
+    goals = [k for k in ran["kind"].values.tolist() if k in (*REACHED, Fate.NOT_LATCHED.words)]
     came = (ran.sel(kind=goals).sum("kind") / ran.sum("kind")).values
     if not np.isfinite(came).all() or came[0] == came[1]:
         return []

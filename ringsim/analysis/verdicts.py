@@ -44,6 +44,7 @@ from ringsim.analysis.requirements import (
     rule_of,
     violations,
 )
+from ringsim.outputs import OUTPUTS
 from ringsim.tables import Table, bound_text, counted, number_text, with_unit
 from ringsim.variables import GO_ON, GOALS, Code, Fate, about, flags_of
 
@@ -199,8 +200,8 @@ _MEANING = {
 
 _SLIGHT = 0.05
 """Chance below which it is told that more samples will hardly show a requirement met."""
-_FINAL = ("deployment_time", "asynchrony_max", "least_latch_rate", "peak_latch_rate")
-"""Outputs that do not change any more once every V-joint has come to 180 deg."""
+_SHOCKS = frozenset(name for output in OUTPUTS for name, _ in output.shocks)
+"""Outputs that latches raise as they catch; to others a ring has come that opened without."""
 
 
 def _judged(
@@ -215,8 +216,8 @@ def _judged(
     absent = used & (np.isnan(numbers(campaign, name)) if name != OUTCOME else False)
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
     short = used & ~broken & ended_short(campaign)
-    if name in _FINAL and "deployment_time" in campaign:  # then, whatever becomes of latches
-        short &= ~np.isfinite(campaign["deployment_time"].to_numpy())
+    if name not in _SHOCKS:
+        short &= ~np.isfinite(numbers(campaign, "deployment_time"))
     place = campaign["sample"].to_numpy()
     levels = wanted.confidence, wanted.confidence
     looked = int((campaign["status"].to_numpy() >= 0).sum())
@@ -418,7 +419,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         if short := one.get("samples_short"):
             held = one["samples_used"] - one["samples_violating"]
             hint = "" if OUTCOME in analysis["requirement"] else _HINT
-            goal = "all V-joints had come to 180 deg" if name in _FINAL else "it was deployed"
+            goal = "it was deployed" if name in _SHOCKS else "all V-joints had come to 180 deg"
             notes.append(
                 f"{name}: {short} of the {held} samples that meet it ended before {goal}, and meet "
                 f"it only as far as they came{hint}"

@@ -145,13 +145,15 @@ def test_rings_that_never_opened_are_counted_beside_the_limit_that_they_keep_to(
     assert "set a requirement on the outcome" not in text_of(found)
     assert found.samples_short.values.tolist() == [3, 0]
     assert "short of their goal" not in text_of(analyse(campaign(np.full(240, 9.0)), MOST_TEN))
-    # What ends at 180 deg is final for rings whose latches then miss; tension is not.
+    # What ends at 180 deg is final for rings whose latches then miss; the shock of these is not.
     made = campaign(values, outcome=np.where(outcome == Fate.STALLED, Fate.NOT_LATCHED, outcome))
     made["deployment_time"] = "sample", np.full(240, 5.0)
-    made["peak_tension"] = made["asynchrony_max"]
-    most_ten = {"peak_tension": MOST_TEN["asynchrony_max"]} | MOST_TEN
+    other = ("peak_tension", "least_drive_margin", "peak_lock_impulse")
+    made = made.assign(dict.fromkeys(other, made["asynchrony_max"]))
+    most_ten = dict.fromkeys([*made.data_vars.keys() & other, "asynchrony_max"],
+                             MOST_TEN["asynchrony_max"])  # fmt: skip
     short = analyse(made, most_ten).samples_short.to_series().to_dict()
-    assert short == {"peak_tension": 3, "asynchrony_max": 0}
+    assert short == dict.fromkeys(most_ten, 0) | {"peak_lock_impulse": 3}
 
 
 def test_an_antenna_that_never_deploys_violates_a_deployment_time():
