@@ -254,6 +254,8 @@ def _meant(text: str, kind: str, wanted: str) -> str:
 
     >>> _meant("100MPa", "float_type", "Pa"), _meant("2 knots", "float_type", "m/s")
     ('1e+08', 'the number alone')
+    >>> _meant("60 C", "float_type", "K")
+    '333.15'
     """
     if kind.startswith("bool"):
         return {"true": "true", "yes": "true", "false": "false", "no": "false"}.get(
@@ -267,6 +269,8 @@ def _meant(text: str, kind: str, wanted: str) -> str:
     if not behind or behind == wanted:
         return alone
     value = in_unit(float(alone), behind, wanted)
+    if wanted == "K" and behind.lower().removeprefix("deg").strip() in ("c", "celsius"):
+        value = float(alone) + 273.15
     return "the number alone" if value is None else f"{value:.6g}"
 
 

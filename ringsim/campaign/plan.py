@@ -425,13 +425,16 @@ def time_left(campaign: Folder, workers: int, running: Mapping[int, float] | Non
     """About how long samples, and checks by the other engine, take that are left, by those that
     have ended; ``running`` are those that run, each with how long it has, s.
 
-    Before any check has ended one is taken for as many times a sample as in a plan.
+    Before any check has ended one is taken for as many times a sample as in a plan, and before any
+    sample has ended one for so much less than a check.
     """
     cost, checked = relative_cost(campaign.table, campaign.scene), campaign.unchecked()
     found = campaign.survey()
     per_sample = _per_cost(cost, found)
     per_check = _per_cost(cost, campaign.survey(checks=True)) if len(checked) else np.nan
     guessed = len(checked) > 0 and np.isnan(per_check)
+    from_check = np.isnan(per_sample) and not guessed and not np.isnan(per_check)
+    per_sample = per_check / _FULL if from_check else per_sample
     left = np.concatenate([found.missing, ~checked]).astype(np.int64)  # as ``check_of``
     if not len(left):
         return "none"
@@ -460,6 +463,8 @@ def time_left(campaign: Folder, workers: int, running: Mapping[int, float] | Non
         told += " (costly samples come first)"  # as those with error bars: the rate so far is less
     if guessed and (is_check & known).any():
         told += f", a check taken as {_FULL:g} times a sample"
+    if from_check and not is_check.all():
+        told += f", a sample taken as a check / {_FULL:g}"
     for kind, word in ((~is_check, "sample"), (is_check, "check")):
         if count := int((kind & ~known).sum()):
             told += f", plus {counted(count, word)} of unknown duration"
