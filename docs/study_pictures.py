@@ -9,7 +9,6 @@ rigid ring without a standard's factors, against what the flexible one did, and 
 ``rare_asynchrony.png`` from runs/rare-asynchrony and runs/plain, of which it prints the table, too.
 """
 
-import math
 import sys
 from pathlib import Path
 
@@ -17,16 +16,16 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from pictures import save
+from scipy.interpolate import CubicSpline
 
 from ringsim.analysis.design import endings
 from ringsim.analysis.intervals import good, share_interval
 from ringsim.analysis.tails import replicated_interval, subset_simulation
+from ringsim.parts.margin import EcssMechanisms, MarginStandard
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import LOOKS
 from ringsim.plots.figures import figures_of
-from ringsim.rigid.drive import Drive
-from ringsim.rigid.mechanism import Mechanism
-from ringsim.rigid.resistances import Opening, resistances
+from ringsim.rigid.margin import DriveMargin, Margin
 from ringsim.sampling.designs.levels import Repetition, levels
 from ringsim.scene import scene_from_toml
 from ringsim.variables import PLANES
@@ -93,35 +92,41 @@ def winding_laws(runs: Path) -> Figure:
     return figure
 
 
-def static_margins(campaign: xr.Dataset) -> np.ndarray:
-    """Of the rigid ring of every sample at its start, without factors; negative: it cannot open.
+PLAIN = EcssMechanisms(
+    inertia=1.0, spring=1.0, friction=1.0, gravity=1.0, load=1.0, latch=1.0, driving_spring=1.0,
+    motorisation=1.0,
+)  # fmt: skip
+"""What drives over what resists, less one, without factors."""
 
-    What drives over what resists, less one.  Friction of joints is linear in its coefficient, what
-    a cable drives in its winch's tension; weight is the same for all samples.
+
+def static_margins(campaign: xr.Dataset, standard: MarginStandard = PLAIN) -> np.ndarray:
+    """Of the rigid ring of every sample at its start; negative: it cannot open.
+
+    What a cable drives is smooth in the friction of its pulleys and linear in its motor's torque,
+    what joints resist in their friction; so a few rings tell of all.
     """
     scene = scene_from_toml(campaign.attrs["scene"], source="attribute scene")
-    mechanism = Mechanism(scene)
-    drive, start = Drive(scene, mechanism), math.pi - 2.0 * scene.structure.coordinate
-    now = mechanism.at(scene.structure.coordinate)
-    friction = campaign["cables_upper_friction_coefficient"].to_numpy()
-    driving = np.zeros(len(friction))
-    for plane, cable, reeved in zip(PLANES, drive.cables, drive.reeved(now), strict=True):
-        for sample, own in enumerate(friction):
-            law = cable.friction.factored(own / cable.friction.coefficient)
-            decay = law.bound_decay(reeved.angles, cable.pulley_radius)
-            shares = np.exp(np.append(0.0, np.cumsum(decay)))
-            weak = float(campaign[f"cables_{plane}_winch_winding_derating"][sample])
-            pull = weak * cable.winch.winding.available_tension()
-            driving[sample] += pull * float(shares @ reeved.shortening)
+    friction = [f"cables.{plane}.friction.coefficient" for plane in PLANES]
+    torque = [f"cables.{plane}.winch.winding.derating" for plane in PLANES]
+
+    def at_start(values: dict[str, float]) -> Margin:
+        drive = DriveMargin(scene.with_values(values), standard)
+        return drive.at(drive.start)
+
+    own = campaign["cables_upper_friction_coefficient"].to_numpy()
+    grid = np.linspace(own.min(), own.max(), 9)
+    whole = [at_start(dict.fromkeys(friction, f) | dict.fromkeys(torque, 1.0)) for f in grid]
+    cables = CubicSpline(grid, [each.pulls[1] for each in whole])(own)
+    left = np.stack([campaign[path.replace(".", "_")].to_numpy() for path in torque], axis=1)
     dry = campaign["joints_vjoint_coulomb"].to_numpy()
-
-    def resisting(coulomb: float) -> float:
-        own = scene.with_values({"joints.vjoint.coulomb": coulomb})
-        kinds = resistances(own, Mechanism(own))
-        return sum(one.force(Opening(start, 0.0, 0.0, now)) for one in kinds)
-
-    low, high = resisting(0.01), resisting(0.02)
-    return driving / (low + (high - low) * (dry - 0.01) / 0.01) - 1.0
+    ends = [at_start({"joints.vjoint.coulomb": each}) for each in (dry.min(), dry.max())]
+    required, springs = (
+        np.interp(dry, [dry.min(), dry.max()], values)
+        for values in zip(
+            *((each.required, each.counted - each.pulls[1].sum()) for each in ends), strict=True
+        )
+    )
+    return (np.sum(left * cables, axis=1) + springs) / required - 1.0
 
 
 @style.styled

@@ -6,8 +6,11 @@ import re
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from pages import ROOT
+from ringsim.rigid.margin import DriveMargin
+from ringsim.scene import load_scene
 
 
 def test_no_sample_is_left_out_above_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -22,6 +25,27 @@ def test_no_sample_is_left_out_above_a_limit(monkeypatch: pytest.MonkeyPatch) ->
         drawn = above[np.searchsorted(places, limit, side="right") - 1]
         assert drawn == sum(value > limit for value in values.tolist())
     assert above[-3:].tolist() == [1, 0, 0]
+
+
+def test_margins_of_many_rings_are_those_of_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a few rings whose friction and torque lie between, against the margin of every one."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    from study_pictures import PLAIN, static_margins
+
+    scene, rng = load_scene("ring18-motor"), np.random.default_rng(3)
+    paths = {
+        "cables.upper.friction.coefficient": (4e-4, 1e-3), "joints.vjoint.coulomb": (0.01, 0.025),
+        "cables.upper.winch.winding.derating": (0.6, 1.0),
+        "cables.lower.winch.winding.derating": (0.6, 1.0),
+    }  # fmt: skip
+    drawn = {path: rng.uniform(*ends, 6) for path, ends in paths.items()}
+    names = {path.replace(".", "_"): ("sample", values) for path, values in drawn.items()}
+    found = static_margins(xr.Dataset(names, attrs={"scene": scene.to_toml()}))
+    for k, margin in enumerate(found.tolist()):
+        values = {path: float(each[k]) for path, each in drawn.items()}
+        lower = {"cables.lower.friction.coefficient": values["cables.upper.friction.coefficient"]}
+        drive = DriveMargin(scene.with_values(values | lower), PLAIN)
+        assert margin == pytest.approx(drive.at(drive.start).margin, abs=1e-4)
 
 
 def test_examples_stand_beside_pictures_that_exist(monkeypatch: pytest.MonkeyPatch) -> None:
