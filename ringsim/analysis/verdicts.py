@@ -198,8 +198,9 @@ _MEANING = {
 }  # fmt: skip
 
 
-_SLIGHT = 0.05
-"""Chance below which it is told that more samples will hardly show a requirement met."""
+_SLIGHT, _NEVER = 0.05, 1e-6
+"""Chances below which it is told that more samples will hardly show a requirement met, and below
+which nobody asks how small that is."""
 _SHOCKS = frozenset(name for output in OUTPUTS for name, _ in output.shocks)
 """Outputs that latches raise as they catch; to others a ring has come that opened without."""
 
@@ -396,8 +397,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             gone = counted(one["samples_lost"], "failed run")
             kept = f" (if the {gone} are counted as violations)" * bool(one["samples_lost"])
             so_far = f"{bad} of {used} violate it so far; " * bool(bad)
-            odds = max((1.0 - bad / max(used, 1)) ** further, 1e-6) if not kept else 1.0
-            kept += f", which has a chance of {odds:.1g} at such a share" * (odds < _SLIGHT)
+            odds = (1.0 - bad / max(used, 1)) ** further if not kept else 1.0
+            of = f"of {odds:.1g}" if odds >= _NEVER else f"below {_NEVER:.0e}"
+            kept += f", which has a chance {of} at such a share" * (odds < _SLIGHT)
             notes.append(f"{name}: {so_far}{more} without a violation would prove it{kept}")
         if bad and verdict != Verdict.NO_POPULATION:
             low = bound_text(1.0 - one["probability_upper"], upper=False)

@@ -73,7 +73,8 @@ WORDS = {
     "samples beyond": "samples whose value is beyond the limit of the scene, each beyond its own "
     "where it is drawn",
     "samples to go": "how many more samples, none of them violating, would show the requirement",
-    "samples used": "samples whose run holds and has a value of the output",
+    "samples used": "samples whose run holds; in statistics of an output those that have a value "
+    "of it, in verdicts also those without, which violate",
     "separation": "of all pairs of a sample in the group and one outside, the share in which the "
     "one in the group has the larger (or smaller) input; 50 % tells nothing",
     "set aside": "readings that do not fit, few enough to be left out: strays",

@@ -118,6 +118,10 @@ def test_further_samples_would_show_only_what_lost_ones_leave_open():
         f"asynchrony_max: 8 of 20 violate it so far; {more} further samples without a violation "
         f"would prove it, which has a chance of {0.6**more:.1g} at such a share"
     ) in text_of(found)
+    low = {"asynchrony_max": {"max": 10.0, "probability": 0.3, "confidence": 0.99}}
+    (line,) = (each for each in text_of(analyse(campaign(np.full(4, 11.0)), low)).splitlines()
+               if "would prove it" in each)  # fmt: skip
+    assert line.endswith("would prove it, which has a chance below 1e-06 at such a share")
     status[:] = Status.TIMEOUT
     found = analyse(made.assign(status=("sample", status)), MOST_TEN)
     assert found.further_samples.item() == -1

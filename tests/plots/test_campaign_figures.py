@@ -524,6 +524,15 @@ def test_of_too_many_numbers_those_that_differ_most_are_drawn_also_without_a_sum
         assert all(axes.get_visible() for axes in convergence(campaign).axes), count
 
 
+def test_counts_that_differ_are_drawn_as_well() -> None:
+    campaign = made_campaign(8)
+    campaign["latched_joints"] = "sample", 20 + np.arange(8) % 3
+    campaign["locked_joints"] = "sample", [24] * 8
+    names, _ = shown(campaign)
+    assert "latched_joints" in names
+    assert "locked_joints" not in names
+
+
 def test_a_sheet_has_the_panels_that_matter_and_names_the_others() -> None:
     """Nine at most: what is required first, and inputs in the order of their correlations."""
     campaign = made_campaign(8)

@@ -197,7 +197,7 @@ def drawable(campaign: xr.Dataset) -> list[str]:
         name for name, variable in quantities().items()
         if name not in names and name in campaign and len(values_of(campaign, name)[1])
         and (name in limited or (
-            variable.dtype == "f8" and not is_moment(name) and varies(campaign, name)
+            variable.dtype != "str" and not is_moment(name) and varies(campaign, name)
         ))
     ], limited)  # fmt: skip
 
