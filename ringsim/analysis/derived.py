@@ -153,8 +153,15 @@ def declare(outputs: Mapping[str, Derived]) -> None:
     """Make derived outputs known wherever outputs are looked up; the last definition counts."""
     forget(outputs)
     for name, each in outputs.items():
-        content = {"variables": (each.variable(name),), "needs": (OF_CAMPAIGNS,), "rank": _LAST}
+        content = {"variables": (each.variable(name),), "needs": (OF_CAMPAIGNS,), "rank": _LAST,
+                   "of_opening": all(map(of_opening, each.names))}  # fmt: skip
         _DECLARED[name] = type(f"Derived_{name}", (Output,), content)
+
+
+def of_opening(name: str) -> bool:
+    """Whether an output tells of the opening alone; a user's own one if all do that it reads."""
+    own = (each for each in OUTPUTS if any(one.name == name for one in each.variables))
+    return next((each.of_opening for each in own), False)
 
 
 def forget(names: Iterable[str]) -> None:

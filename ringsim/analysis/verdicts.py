@@ -20,6 +20,7 @@ from ringsim.analysis.campaign_notes import (
     slow_latches,
     uncertain_latches,
 )
+from ringsim.analysis.derived import of_opening
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import (
     Interval,
@@ -44,7 +45,6 @@ from ringsim.analysis.requirements import (
     rule_of,
     violations,
 )
-from ringsim.outputs import OUTPUTS
 from ringsim.tables import Table, bound_text, counted, number_text, with_unit
 from ringsim.variables import GO_ON, GOALS, Code, Fate, about, flags_of
 
@@ -187,7 +187,7 @@ _MEANING = {
         "samples used whose value may be off, by what their runs say, or that are closer to the "
         "limit than the numerical error", "i8"),
     "samples_close": ("of these, samples closer to the limit than the numerical error", "i8"),
-    "samples_unsure": ("of these, samples that latches decide which may or may not catch", "i8"),
+    "samples_unsure": ("of these, samples in which a latch that may miss decides", "i8"),
     "numerical_error": (
         "error bar that samples without one take from those that ended alike, in the median",
         "f8"),
@@ -201,8 +201,6 @@ _MEANING = {
 _SLIGHT, _NEVER = 0.05, 1e-6
 """Chances below which it is told that more samples will hardly show a requirement met, and below
 which nobody asks how small that is."""
-_SHOCKS = frozenset(name for output in OUTPUTS for name, _ in output.shocks)
-"""Outputs that latches raise as they catch; to others a ring has come that opened without."""
 
 
 def _judged(
@@ -217,7 +215,7 @@ def _judged(
     absent = used & (np.isnan(numbers(campaign, name)) if name != OUTCOME else False)
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
     short = used & ~broken & ended_short(campaign)
-    if name not in _SHOCKS:
+    if of_opening(name):
         short &= ~np.isfinite(numbers(campaign, "deployment_time"))
     place = campaign["sample"].to_numpy()
     levels = wanted.confidence, wanted.confidence
@@ -421,7 +419,7 @@ def verdict_table(analysis: xr.Dataset) -> Table:
         if short := one.get("samples_short"):
             held = one["samples_used"] - one["samples_violating"]
             hint = "" if OUTCOME in analysis["requirement"] else _HINT
-            goal = "it was deployed" if name in _SHOCKS else "all V-joints had come to 180 deg"
+            goal = "all V-joints had come to 180 deg" if of_opening(name) else "it was deployed"
             notes.append(
                 f"{name}: {short} of the {held} samples that meet it ended before {goal}, and meet "
                 f"it only as far as they came{hint}"

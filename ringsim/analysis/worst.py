@@ -514,10 +514,9 @@ def margins(campaign: xr.Dataset, plane: str = "") -> xr.Dataset:
         k, units = int(np.nanargmin(ratio)), quantities()[peak].units
         bound = float(np.broadcast_to(allowed, ratio.shape)[k])
         told = f"{path} = {with_unit(f'{bound:g}', units)}"
-        if np.ptp(own := np.atleast_1d(allowed)[: len(ratio)]) > 0.0:  # each sample its own
-            ends = f"{own.min():.4g} .. {own.max():.4g}"
-            there = f"{bound:.4g} in sample {int(campaign['sample'][k])}"
-            told = f"{path} = {with_unit(ends, units)} (drawn, {there})"
+        if (low := np.nanmin(allowed)) < (high := np.nanmax(allowed)):  # each sample has its own
+            ends = with_unit(f"{low:.4g} .. {high:.4g}", units)
+            told = f"{path} = {ends} (drawn, {bound:.4g} in sample {int(campaign['sample'][k])})"
         later = series and exceeded(numbers(campaign, peak)[k], values[k])
         of = f"{series} after the last lock, as recorded" if later else peak
         known = good(campaign) & np.isfinite(values)  # ropes that never were slack have 0 s of it

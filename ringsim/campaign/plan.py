@@ -461,10 +461,8 @@ def time_left(campaign: Folder, workers: int, running: Mapping[int, float] | Non
     done = np.isfinite(found.seconds)
     if len(found.missing) and done.any() and cost[found.missing].mean() < 0.8 * cost[done].mean():
         told += " (costly samples come first)"  # as those with error bars: the rate so far is less
-    if guessed and (is_check & known).any():
+    if (guessed and (is_check & known).any()) or (from_check and not is_check.all()):
         told += f", a check taken as {_FULL:g} times a sample"
-    if from_check and not is_check.all():
-        told += f", a sample taken as a check / {_FULL:g}"
     for kind, word in ((~is_check, "sample"), (is_check, "check")):
         if count := int((kind & ~known).sum()):
             told += f", plus {counted(count, word)} of unknown duration"

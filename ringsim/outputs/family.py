@@ -382,6 +382,9 @@ class Output:
     """Field of ``ringsim.parts.solver.Limits`` that its largest reading must not pass."""
     of_antenna: ClassVar[bool] = True
     """Whether it tells of the antenna, so that engines are compared by it, not of the run."""
+    of_opening: ClassVar[bool] = False
+    """Whether it tells of the opening alone, so that a ring has come through all of it that opened
+    without latching: latches that catch may raise the others."""
     of_both: ClassVar[bool] = False
     """Whether both engines compute it by the same code: neither judges the other by it."""
     late: ClassVar[bool] = False

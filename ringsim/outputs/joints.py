@@ -28,6 +28,7 @@ class OpeningAngle(Output):
     """Angle between the bar halves; of a planar truss, between its beams and the axis."""
 
     rank = 10
+    of_opening = True
     variables = (
         Variable(
             "opening_angle", ("plane", "section", "time"), "degree", "angle between the bar halves",
@@ -54,6 +55,7 @@ class Asynchrony(Output):
     """Largest difference of opening angles between V-joints over time, and its maximum."""
 
     rank = 20
+    of_opening = True
     variables = (
         Variable(
             "asynchrony", ("time",), "degree",
@@ -166,6 +168,7 @@ class Deployment(Output):
     """The lock time of every V-joint, and the latest of them."""
 
     rank = 0
+    of_opening = True
     variables = (
         Variable(
             "deployment_time", (), "s", "time at which the last V-joint reached 180 deg",
@@ -191,25 +194,27 @@ class Deployment(Output):
         }
 
     def told(self, values: Values, span_names: SpanNames) -> str:
-        """Which V-joint locked last, with those that the error bar does not tell from it: as "last
-        lower 11 (or upper 11, by the error bar)"; empty if that is not known.
+        """Which V-joint locked last, with those that the error bar does not tell from it: as
+        "(last: lower 11, or by the error bar upper 11)"; empty if that is not known.
         """
         if any(name not in values for name in ("lock_time", *_PLACE)):
             return ""
         locks = np.asarray(values["lock_time"])
         last, bar = locks.max(), float(values.get("deployment_time_error", np.nan))
+        if not np.isfinite(last) or locks.size < 2:
+            return ""
+        if locks.min() >= last - _AT_ONCE * last:
+            return "(all at once)"
         near = locks >= last - (bar if bar < math.inf else _AT_ONCE * last)
-        if near.all() or not near.any():
-            return "all at once" * bool(near.any())
+        if near.all():
+            return "(which is last the error bar does not tell)"
         order = np.argsort(-locks, axis=None, kind="stable")[: near.sum()]
         where = [np.asarray(values[name])[k] for name, k in
                  zip(_PLACE, np.unravel_index(order, locks.shape), strict=True)]  # fmt: skip
-        names = [f"{plane} {section}" for plane, section in zip(*where, strict=True)]
-        first, *others = names
+        first, *others = [f"{plane} {section}" for plane, section in zip(*where, strict=True)]
         others[_NAMED:] = [f"{len(others) - _NAMED} more"] * (len(others) > _NAMED)
-        if bar < math.inf:
-            return f"last {first}" + f" (or {', '.join(others)}, by the error bar)" * bool(others)
-        return f"last {' and '.join([first, ', '.join(others)][: 1 + bool(others)])}"
+        by_bar = "or by the error bar " * (bar < math.inf)
+        return f"(last: {first}" + f", {by_bar}{', '.join(others)}" * bool(others) + ")"
 
 
 # How fast V-joints met their latches, and which of these caught.
@@ -226,6 +231,7 @@ class Latching(Output):
     """
 
     rank = 5
+    of_opening = True
     needs = ("latches",)
     peak = LEAST
     variables = (
@@ -265,6 +271,7 @@ class FastestLatch(Output):
     """
 
     rank = 5
+    of_opening = True
     needs = ("latches",)
     peak = LARGEST
     variables = (

@@ -46,6 +46,7 @@ class Motors(Output):
 
     late = True
     rank = 45
+    of_opening = True
     needs = ("motors",)
     electrical: ClassVar = tuple(
         Variable(name, ("plane", "winch", "time"), units, words, needs=_CONSTANTS)
@@ -296,6 +297,7 @@ class DriveMargins(Output):
     """
 
     rank = 46
+    of_opening = True
     of_both = True  # the statics of rigid rods, at angles that hardly differ
     needs = ("margin",)
     coordinates = (

@@ -36,6 +36,7 @@ class CableTension(Output):
 
     late = True
     rank = 40
+    of_opening = True
     needs = ("cables",)
     peak = TENSION_PEAK
     limit = "tension"
@@ -112,6 +113,7 @@ class SlackDuration(Output):
 
     late = True
     rank = 41
+    of_opening = True
     needs = ("cables",)
     variables = (
         Variable(
@@ -152,6 +154,7 @@ class LongestSlack(Output):
 
     late = True
     rank = 41
+    of_opening = True
     needs = ("cables",)
     peak = PEAK_OF_SLACK
     variables = (

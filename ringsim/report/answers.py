@@ -188,9 +188,10 @@ def field_text(of: Of, path: str) -> str:
     known = by_path(of.campaign)
     if path in known:
         values = of.campaign[known[path]].to_numpy()
-        if values.dtype.kind in "OU":
-            return f"drawn ({', '.join(sorted({str(v) for v in values.ravel().tolist()}))})"
-        return f"{number_text(values.min(), 4)} .. {number_text(values.max(), 4)} (drawn)"
+        if values.dtype.kind in "OUb":
+            return f"{', '.join(sorted({str(v).lower() for v in values.ravel().tolist()}))} (drawn)"
+        ends = dict.fromkeys(number_text(end(values), 4) for end in (np.nanmin, np.nanmax))
+        return f"{' .. '.join(ends)} (drawn)"
     if any(path.startswith(f"{each}.") for each in known):
         return "drawn"
     return show(of.scene[path]) + ", drawn in part" * any(e.startswith(f"{path}[") for e in known)

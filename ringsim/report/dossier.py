@@ -271,7 +271,7 @@ def _latching(of: Of) -> Answer:
     if found.result:
         found.result = [line for line in fates(of) if line.startswith(REACHED)] + found.result
         if of.scene.get(rate := "latch.min_rate") or rate in by_path(of.campaign):
-            found.evidence.append(f"a latch catches from {field_text(of, rate)} rad/s on")
+            found.evidence.append(f"rate from which a latch catches, rad/s: {field_text(of, rate)}")
         others = _temperature(of).lacks | _tolerances(of).lacks
         found.lacks |= {what: others[what] for what in others if what.startswith("scatter")}
     return found

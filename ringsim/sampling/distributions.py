@@ -372,12 +372,12 @@ class Truncated(Ranged):
             if getattr(self.of, name):
                 raise ValueError(f"of.{name} must be given beside kind, not inside of")
         below, above = self._ends()
+        if above < below:
+            raise ValueError(f"low = {self.low} must be below high = {self.high}")
         if above - below < LEAST_MASS:
-            raise ValueError(
-                f"low = {self.low}, high = {self.high} keep only a probability of "
-                f"{above - below:.1e}, must be at least {LEAST_MASS:g}: widen the bounds or move "
-                "the mean"
-            )
+            mass = f"a probability of {above - below:.1e}, must be at least {LEAST_MASS:g}"
+            ends = f"low = {self.low}, high = {self.high}"
+            raise ValueError(f"{ends} keep only {mass}: widen the bounds or move the mean")
         return self
 
     def _ends(self) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from loops import for_each
 from made_campaign import made_campaign
 
 from made import campaign, points, response
+from ringsim.analysis.derived import Derived, declare, forget
 from ringsim.analysis.intervals import samples_needed, share_bounds
 from ringsim.analysis.requirements import to_json
 from ringsim.analysis.study import analyse
@@ -158,6 +159,14 @@ def test_rings_that_never_opened_are_counted_beside_the_limit_that_they_keep_to(
                              MOST_TEN["asynchrony_max"])  # fmt: skip
     short = analyse(made, most_ten).samples_short.to_series().to_dict()
     assert short == dict.fromkeys(most_ten, 0) | {"peak_lock_impulse": 3}
+    own = {"twice": "2 * peak_tension", "shaken": "peak_tension * peak_lock_impulse"}
+    declare({name: Derived(of=text) for name, text in own.items()})
+    try:
+        made = made.assign(dict.fromkeys(own, made["asynchrony_max"]))
+        short = analyse(made, dict.fromkeys(own, MOST_TEN["asynchrony_max"])).samples_short
+        assert short.to_series().to_dict() == {"twice": 0, "shaken": 3}
+    finally:
+        forget(own)
 
 
 def test_an_antenna_that_never_deploys_violates_a_deployment_time():

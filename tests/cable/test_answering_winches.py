@@ -98,6 +98,24 @@ def test_near_the_last_answer_a_few_questions_are_enough() -> None:
         assert 1 <= len(asked) <= 5
 
 
+@pytest.mark.parametrize("steep", [1e2, 1e3, 1e4, 1e5])
+@pytest.mark.parametrize("root", [0.011, 0.043, 0.08])
+def test_a_step_is_found_with_few_questions_more_than_by_halves(root: float, steep: float) -> None:
+    """Beside a step lines from side to side leave nearly all that they search, again and again:
+    without halves between them they ask up to 1,100 times."""
+    asked = []
+
+    def excess(v: float) -> float:
+        asked.append(v)
+        return v - root + (1e-6 * steep if v > root else -1e-8 * steep)
+
+    for guess in (0.0, 0.05, 0.1):
+        for gain in (1.0, 1e3, 1e6):
+            asked.clear()
+            assert found(excess, guess, gain)[0] == pytest.approx(root, rel=1e-10)
+            assert len(asked) <= 110  # by halves alone some 40
+
+
 def test_what_has_been_asked_is_not_asked_again() -> None:
     asked = []
     winches, _ = rope()

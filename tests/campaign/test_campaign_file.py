@@ -91,6 +91,12 @@ def test_example_in_the_guide_can_be_drawn(tmp_path):
         ("structure.sections = 6", "structure.section = 6", "structure.section is not a known key"),
         ('boom = "none"', "boom = 3", "boom"),
         ("low = 0.01", "low = 0.03", "must be below high"),
+        (
+            '{ kind = "normal", mean = 120e9, standard_deviation = 6e9 }',
+            '{ kind = "truncated", low = 130e9, high = 110e9, of = { kind = "normal", '
+            "mean = 120e9, standard_deviation = 6e9 } }",
+            r"low = 130000000000\.0 must be below high = 1100",
+        ),
         ("[set]", "[set", "not valid TOML"),
         ("[inputs]", "[limits]\ntimeout = 0\n[inputs]", r"limits\.timeout = 0 s must be at least"),
         ("[inputs]", "[limits]\nmemory = 1\n[inputs]", r"limits\.memory"),

@@ -253,7 +253,7 @@ def test_time_left_counts_samples_and_checks_apart(copied):
     assert time_left(checked, 2) == "not known yet"
     # Checks run first: of one of 30 s a sample is taken to be 1 s.  Two are left, and ten samples.
     checks[3] = 30.0
-    assert time_left(checked, 2) == "about 35 s, a sample taken as a check / 30"
+    assert time_left(checked, 2) == "about 35 s, a check taken as 30 times a sample"
     # Two of the eight that are over had error bars, and took several times as long.
     bars = np.isin(np.arange(10), [0, 5])
     column = replace(folder.table.columns[0], path="solver.error_bars", values=bars)

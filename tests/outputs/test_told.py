@@ -51,17 +51,30 @@ def test_a_deployment_time_tells_which_joints_lock_last() -> None:
     def told() -> str:
         return " ".join(summary(values, {})["deployment_time"].split()[2:])
 
-    assert told() == "last lower 3"
+    assert told() == "(last: lower 3)"
     values["deployment_time_error"] = np.array(0.015)
-    assert told() == "+- 0.015 last lower 3 (or upper 2, by the error bar)"
-    values["deployment_time_error"] = np.array(3.5)
-    assert told() == "+- 3.5 last lower 3 (or upper 2, lower 2, lower 1, 1 more, by the error bar)"
+    assert told() == "+- 0.015 (last: lower 3, or by the error bar upper 2)"
+    values["deployment_time_error"] = np.array(3.4)
+    more = "upper 2, lower 2, lower 1, 1 more"
+    assert told() == f"+- 3.4 (last: lower 3, or by the error bar {more})"
+    values["deployment_time_error"] = np.array(5.0)
+    assert told() == "+- 5 (which is last the error bar does not tell)"
     del values["deployment_time_error"]
     values["lock_time"] = np.array([[11.0, 12.0, 12.0 - 1e-12], [9.0, 12.0, 8.0]])
-    assert told() == "last lower 2 and upper 2, lower 3"
+    assert told() == "(last: lower 2, upper 2, lower 3)"
     values["lock_time"] = np.full((2, 3), 12.0)
-    assert told() == "all at once"
+    assert told() == "(all at once)"
+    values["deployment_time_error"] = np.array(0.1)
+    assert told() == "+- 0.1 (all at once)"
+    del values["deployment_time_error"]
     values["lock_time"] = np.array([[11.0, np.nan, 12.0], [9.0, 12.0, 8.0]])
+    assert told() == ""
+    alone = {
+        "plane": np.array(["upper"]),
+        "section": np.array([1]),
+        "lock_time": np.array([[12.0]]),
+    }
+    values |= alone
     assert told() == ""
 
 

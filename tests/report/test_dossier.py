@@ -343,7 +343,7 @@ def test_rates_of_latches_by_section_and_antennas_without_cables_are_told() -> N
     assert "[latch]" not in scene
     campaign.attrs["scene"] = f"{scene}\n[latch]\nmin_rate = [0.05, 0.06, 0.05, 0.06]\n"
     told = row(rows_of(campaign), "Latching or locking")["evidence"]
-    assert "a latch catches from [0.05, 0.06, 0.05, 0.06] rad/s on" in told
+    assert "rate from which a latch catches, rad/s: [0.05, 0.06, 0.05, 0.06]" in told
     without = row(rows_of(campaign.drop_vars("peak_tension")), "Margin of safety")["result"]
     assert "limits.tension" not in without
     assert "limits.tension" in row(rows_of(campaign), "Margin of safety")["result"]
@@ -370,7 +370,7 @@ def test_a_field_that_is_drawn_is_told_as_it_was_drawn() -> None:
         campaign[path.replace(".", "_")] = "sample", np.linspace(low, high, 6), says
     rows = rows_of(campaign)
     told = row(rows, "Latching or locking")["evidence"]
-    assert "a latch catches from 0.04 .. 0.05 (drawn) rad/s on" in told
+    assert "rate from which a latch catches, rad/s: 0.04 .. 0.05 (drawn)" in told
     assert "friction 1.5 .. 2 (drawn)" in row(rows, "(motorization)")["evidence"]
     told = row(rows, "4.8.2.1 Cases")["result"]
     assert "offload.friction = 0.004 .. 0.006 (drawn)" in told

@@ -66,6 +66,30 @@ def test_the_mean_is_exact_and_intervals_hold_the_truth(exact, samples, replicat
     assert held >= binom.ppf(1e-3, campaigns, 0.92), held
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("samples", "campaigns", "median"), [(50, 200, 0.61), (200, 100, 0.91)])
+def test_small_levels_tell_too_little_of_two_sides_as_a_rule_and_the_mean_is_exact(
+    samples, campaigns, median
+):
+    """Either of two sums of eight normal numbers, with 1.2e-5 in all."""
+    exact = 1.2e-5
+    target, rng = -norm.ppf(1.0 - (1.0 - exact) ** 0.5), np.random.default_rng(0)
+
+    def farther(points):
+        return np.maximum(points[:, :8].sum(axis=1), points[:, 8:].sum(axis=1)) / 8**0.5
+
+    found = [
+        [simulated(farther, rng, target=target, samples=samples, axes=16) for _ in range(4)]
+        for _ in range(campaigns)
+    ]
+    each = np.array([[one.probability for one in many] for many in found])
+    chains = np.array([[one.variation for one in many] for many in found])
+    assert abs(each.mean() / exact - 1.0) < 4.0 * each.std() / exact / each.size**0.5
+    assert np.median(each.mean(axis=1)) / exact == pytest.approx(median, abs=0.02)
+    ends = np.array([replicated_interval(*both)[0] for both in zip(each, chains, strict=True)])
+    assert ((ends[:, 0] <= exact) & (exact <= ends[:, 1])).mean() >= 0.92
+
+
 def test_equal_responses_at_a_threshold_go_on_together():
     """A response of a few values only: 3 with probability 1e-3, 2 with 0.02, 1 with 0.2."""
     limits = norm.isf([0.2, 0.02, 1e-3])

@@ -7,8 +7,9 @@
 static const D NUDGE = 1e-8;
 /* Secants before it is searched between both sides: from the last answer three or four are enough. */
 enum { SECANTS = 6 };
-/* One try in this many halves what is left, where bends and roundings lead a line astray. */
-enum { HALVING = 4 };
+/* Tries in a row that left more than half of what they searched, before it is halved: steps and
+   roundings lead lines astray. */
+enum { ASTRAY = 2 };
 /* Speeds (m/s, and relative) that are one: over a step of 0.1 s they wind 1e-14 m more or less, of
    which a rope of EA = 1e5 N takes no notice (1e-10 N). */
 static const D SAME = 1e-15, ALIKE = 1e-11;
@@ -111,38 +112,39 @@ static bool ratios_at(const Asked *asked, const D *speeds, D *ratios) {
 /* A search for the zero of what rises by at least its argument: where it is tried next, how fast it
    rises there, what it is on either side (0 if not known), and where it was tried before. */
 typedef struct {
-    D at, gain, low, high, below, above, from, before;
-    I tries;
+    D at, gain, low, high, below, above, from, before, left;
+    I tries, astray;
 } Search;
 
 static Search search_from(D guess, D gain, D low, D high) {
-    return (Search){.at = fmin(fmax(guess, low), high), .gain = gain, .low = low, .high = high};
+    return (Search){.at = fmin(fmax(guess, low), high), .gain = gain, .low = low, .high = high,
+                    .left = high - low};
 }
 
 /* Whether a search ends with what it has found at its place, of speeds of a size (m/s).
 
    By secants: an iteration or a step ago the answer was nearly the same.  Where bends lead these
-   astray, by lines from side to side; that of a side that stays counts half (Illinois). */
+   astray, by lines from side to side, and halves where these leave too much. */
 static bool ends(Search *search, D over, D size) {
     D same = SAME + ALIKE * size, way = search->at - search->from;
-    bool lies_above = over > 0.0, stays = search->tries && lies_above == (search->before > 0.0);
-    if (lies_above) search->high = search->at, search->above = over;
+    if (over > 0.0) search->high = search->at, search->above = over;
     else search->low = search->at, search->below = over;
-    if (stays) *(lies_above ? &search->below : &search->above) *= 0.5;
     D left = search->high - search->low;
     if (fabs(over) <= same || left <= 2.0 * same) return true;
     if (search->tries && way != 0.0) search->gain = fmax((over - search->before) / way, 1.0);
     search->from = search->at, search->before = over;
+    search->astray = left > 0.5 * search->left ? search->astray + 1 : 0, search->left = left;
     I k = search->tries++;
     /* Never a shorter way, so that the root is passed and held from both sides: a step that is short
        since the gain was too large proves nothing. */
+    D low = search->low, high = search->high, below = search->below, above = search->above;
+    bool known = below != 0.0 && above != 0.0;
     if (k < SECANTS) search->at -= copysign(fmax(fabs(over) / search->gain, same), over);
-    else if (k % HALVING == 0 || search->below == 0.0 || search->above == 0.0)
-        search->at = search->low + 0.5 * left;
-    else
-        search->at = fmin(fmax(search->low + left * search->below / (search->below - search->above),
-                               search->low + same), search->high - same);
-    search->at = fmin(fmax(search->at, search->low), search->high);
+    else search->at = fmin(fmax(low + left * below / (below - above), low + same), high - same);
+    bool tried = (search->at <= low && below != 0.0) || (search->at >= high && above != 0.0);
+    if (tried || (k >= SECANTS && (!known || search->astray >= ASTRAY)))
+        search->at = low + 0.5 * left, search->astray = 0;
+    search->at = fmin(fmax(search->at, low), high);
     return false;
 }
 
