@@ -83,7 +83,6 @@ def unusual(
     Of an input with m places the one that is farthest out among all values counts, with m times
     the share: some place of every sample is far out by chance.  Its mean counts beside, and large
     differences of the two planes' inputs.
-
     Of a design that changes one input at a time what is other than in its base case; of a list of
     cases first their labels, and what most of them have otherwise.  A drawn fault is always told.
     """
@@ -113,9 +112,11 @@ def unusual(
             if own in named or out > (1.0 if _has_words(variable) else _SIDE):
                 continue
             named.add(own)
+            one = variable.ndim > 1 and name in [f"{p} of {own}" for p in place_names(variable)]
+            rows = variable.to_numpy() if one else values
             told.append(
                 _word(variable, place)[1] if _has_words(variable)
-                else _told(name, values, float(values[place]), _units(variable))
+                else _told(name, rows, float(values[place]), _units(variable))
             )  # fmt: skip
         odd = [
             each for own, variable in variables.items() if own not in named

@@ -106,6 +106,16 @@ def test_what_is_far_out_is_told_in_words() -> None:
     assert "temperature 343.1 K (70 C, the highest)" in word
 
 
+def test_a_place_is_compared_with_all_places_also_where_it_separates_the_failure() -> None:
+    """As the note says: the median of all is 1.5, that of section 2 alone 2."""
+    places = np.repeat([[1.0, 2.0, 1.0, 2.0]], 20, axis=0)
+    places[7, 1] = 3.0
+    one = inputs(friction=places)
+    alone = unusual(one, [7])
+    assert alone == ["section 2 of friction 3 m (+100 %, the highest)"]
+    assert unusual(one, [7], [{"section 2 of friction": True}]) == alone
+
+
 def test_a_value_that_many_samples_have_is_not_unusual() -> None:
     """Of a discrete input none lies beyond the last value, and a quarter may have it."""
     for count, rare in ((5, False), (2, True)):  # of 40, on each side: two are one in twenty
