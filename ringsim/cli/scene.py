@@ -354,6 +354,9 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least(), _parted(scene))}"
+        if drive.least().margin < 0.0 and math.isfinite(more := drive.pull_needed()):
+            by = _by_motors(scene)
+            yield f"  a margin of 0 takes {more:.3g} times the pull of all winches{by}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
 
 
@@ -475,6 +478,15 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
             f"of what drives with the standard's factors, against half of what resists: "
             f"{_verdict(least, _parted(scene))}"
         )
+
+
+def _by_motors(scene: Scene) -> str:
+    """What gives winches more pull, if all have motors."""
+    winches = [] if scene.cables is None else [
+        winch for _, cable in scene.cables.present() for winch in cable.winches
+    ]  # fmt: skip
+    motors = [winch.winding.motor is not None for winch in winches]
+    return ", as so many times their stall_torque give" * bool(motors and all(motors))
 
 
 def _told(margin: float) -> str:

@@ -172,6 +172,20 @@ class DriveMargin:
         )  # fmt: skip
         return min(course[k], self.at(float(found.x), time), key=lambda each: each.margin)
 
+    def pull_needed(self) -> float:
+        """How many times as much all winches must pull for a margin of 0 at every angle: what else
+        drives stays as it is.  Infinite where none pulls, or a joint holds.
+        """
+        most = 0.0
+        for now in (*self.course(), self.least()):
+            if now.margin == -1.0:  # as ``_margin`` has it of both
+                return math.inf
+            if now.required > 0.0:
+                pull = float(now.pulls[1].sum())
+                wanted = now.required - (now.counted - pull)
+                most = max(most, wanted / pull if pull > 0.0 else math.inf * (wanted > 0.0))
+        return most
+
     def _angles(self, low: float, high: float, count: int = 33) -> Array:
         """Those of the scene's course, and as many below its start if they begin there."""
         angles = np.linspace(self.start, high, count)

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from motor_rings import ring
 from ringsim.cli import cli
+from ringsim.cli.scene import margin_lines
 from ringsim.outputs.balance import summary
 from ringsim.outputs.motors import DriveMargins
 from ringsim.parts.margin import EcssMechanisms, NasaMechanisms
@@ -275,3 +276,23 @@ def test_a_peak_of_nothing_has_no_place() -> None:
     found = simulate(load_scene("ring18-flight").with_values(few), fidelity="frame")
     assert float(found["peak_net_tension"]) == 0.0
     assert summary(dict(found.variables), {})["peak_net_tension"].split() == ["0", "N"]
+
+
+@pytest.mark.parametrize("weak", [1.0, 0.5])
+def test_so_many_times_the_torque_give_a_margin_of_zero(weak: float) -> None:
+    """Springs that drive stay as they are, so that it is not in the ratio of 1 + margin."""
+    torques = {f"cables.{plane}.winch.winding.stall_torque": 0.005 for plane in ("upper", "lower")}
+    torques["cables.lower.winch.winding.stall_torque"] *= weak
+    scene = load_scene("ring18-motor").with_values(torques)
+    (told,) = (line for line in margin_lines(scene) if "a margin of 0 takes" in line)
+    assert told.endswith("times the pull of all winches, as so many times their stall_torque give")
+    assert scene.margin is not None
+    drive = DriveMargin(scene, scene.margin)
+    more = drive.pull_needed()
+    assert float(told.split()[5]) == pytest.approx(more, rel=5e-3)
+    assert more > 1.1 / (1.0 + drive.least().margin)
+    stronger = scene.with_values({path: more * torque for path, torque in torques.items()})
+    assert DriveMargin(stronger, scene.margin).least().margin == pytest.approx(0.0, abs=1e-3)
+    stuck = {"kind": "stuck-vjoint", "plane": "upper", "section": 1, "time": 0.0}
+    held = DriveMargin(scene.with_values({"faults": [stuck]}), scene.margin)
+    assert held.pull_needed() == np.inf
