@@ -447,14 +447,6 @@ def doubtful(campaign: xr.Dataset) -> tuple[dict[str, Mask], dict[str, str]]:
     return found, cures
 
 
-def uncertain_latches(campaign: xr.Dataset) -> Array:
-    """Of how many latches each sample says that it is uncertain whether they catch."""
-    found = np.zeros(campaign.sizes["sample"])
-    for place, said in _said(campaign):
-        found[place] = said[1].count(",") + 1 + int(said[2] or 0)
-    return found
-
-
 def _said(campaign: xr.Dataset) -> Iterator[tuple[int, re.Match[str]]]:
     """What samples say of latches of which it is uncertain whether they catch, by their places."""
     reasons = campaign["reason"].to_numpy() if "reason" in campaign else ()
@@ -488,11 +480,28 @@ def bars_of(campaign: xr.Dataset, name: str) -> tuple[Array, float]:
     return found, float(np.median(found[rest] if rest.any() else found[known]))
 
 
-def slow_latches(campaign: xr.Dataset) -> Array:
-    """How many latches of each sample met a rate that is closer to the least at which they catch
-    than the rate's numerical error.
+def latches_in_doubt(campaign: xr.Dataset) -> tuple[Array, Array]:
+    """How many latches of each sample may have missed of those that caught, and the reverse: their
+    rate is closer to the least at which they catch than its numerical error, or the run says so.
     """
-    return np.asarray(_slow(campaign).sum(axis=(1, 2)), dtype=float)
+    slow = _slow(campaign)
+    if "latched" not in campaign:
+        either = np.asarray(slow.sum(axis=(1, 2)), dtype=float)
+        for sample, said in _said(campaign):
+            either[sample] = max(either[sample], said[1].count(",") + 1 + int(said[2] or 0))
+        return either, either
+    gone = campaign["latched"].to_numpy() == 0
+    unsure, more = np.zeros(gone.shape, dtype=bool), np.zeros(len(gone))
+    planes = campaign["plane"].values.tolist()
+    for sample, said in _said(campaign):
+        more[sample], plane = int(said[2] or 0), ""  # those without a name may be any
+        for each in said[1].split(", "):  # "upper 3, 4, lower 5"
+            *named, section = each.split()
+            plane = named[0] if named else plane
+            if plane in planes and 0 < int(section) <= unsure.shape[2]:
+                unsure[sample, planes.index(plane), int(section) - 1] = True
+    unsure |= slow
+    return more + np.sum(unsure & ~gone, axis=(1, 2)), more + np.sum(unsure & gone, axis=(1, 2))
 
 
 def open_outcomes(campaign: xr.Dataset) -> Mask:
@@ -500,21 +509,12 @@ def open_outcomes(campaign: xr.Dataset) -> Mask:
     catch did otherwise: none that stalled before its stops, and none another latch of which has
     missed for certain.
     """
-    fate, slow = numbers(campaign, OUTCOME), _slow(campaign)
-    missed = campaign["latched"].to_numpy() == 0 if "latched" in campaign else np.zeros_like(slow)
-    unsure, more = np.zeros(missed.shape, dtype=bool), np.zeros(len(missed))
-    planes = campaign["plane"].values.tolist() if "plane" in campaign else []
-    for sample, said in _said(campaign) if "latched" in campaign else ():
-        more[sample], plane = int(said[2] or 0), ""  # any of those without a name may have missed
-        for each in said[1].split(", "):  # "upper 3, 4, lower 5"
-            *named, section = each.split()
-            plane = named[0] if named else plane
-            if plane in planes and 0 < int(section) <= unsure.shape[2]:
-                unsure[sample, planes.index(plane), int(section) - 1] = True
-    certain = (missed & ~slow & ~unsure).sum(axis=(1, 2)) > more
-    some = slow.any(axis=(1, 2)) | (uncertain_latches(campaign) > 0.0)
-    certain &= fate == Fate.NOT_LATCHED
-    return np.asarray(some & np.isin(fate, [Fate.DEPLOYED, Fate.NOT_LATCHED]) & ~certain)
+    fate, (lost, won) = numbers(campaign, OUTCOME), latches_in_doubt(campaign)
+    missed = 0.0 * won
+    if "latched" in campaign:
+        missed = (campaign["latched"].to_numpy() == 0).sum(axis=(1, 2))
+    caught = (fate == Fate.NOT_LATCHED) & (lost + won > 0.0) & (missed <= won)
+    return np.asarray(caught | ((fate == Fate.DEPLOYED) & (lost > 0.0)))
 
 
 def _slow(campaign: xr.Dataset) -> NDArray[np.bool_]:

@@ -146,7 +146,7 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
         sizes = np.abs(found[f"{name}_mean"].values)
         spread, errors = found[f"{name}_spread"].values, found[f"{name}_numerical_error"].values
         if (spread < np.fmax(_STILL * sizes, errors)).any():
-            still += [name] * (together < _LOW)
+            still += [name] * bool(np.isfinite(together))
             continue
         pairs = int(found[f"{name}_samples"].values[0])
         if together < -float(largest_by_chance(pairs, np.zeros(()), 1)):

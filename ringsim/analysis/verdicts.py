@@ -14,11 +14,10 @@ from ringsim.analysis.campaign_notes import (
     bars_of,
     doubtful,
     drive_notes,
+    latches_in_doubt,
     marked,
     open_outcomes,
     opened,
-    slow_latches,
-    uncertain_latches,
 )
 from ringsim.analysis.derived import of_opening
 from ringsim.analysis.design import Placement
@@ -104,9 +103,10 @@ def judge(
     for name, wanted in requirements.items():
         require_values(campaign, name, wanted)
         off, unsure = doubted.get(name, none), none
-        if name == LATCHED:  # so many more or fewer may have caught; mostly both tell of the same
-            latches = np.maximum(uncertain_latches(campaign), slow_latches(campaign))
-            unsure = latches > np.abs(wanted.beyond(numbers(campaign, name)))
+        if name == LATCHED:  # so many more or fewer may have caught
+            count, (gone, won) = numbers(campaign, name), latches_in_doubt(campaign)
+            kept = [wanted.beyond(count + each) <= 0.0 for each in (0.0, -gone, won)]
+            unsure = (kept[0] != kept[1]) | (kept[0] != kept[2])
         if name == OUTCOME and wanted.is_ == Fate.DEPLOYED.word:
             unsure = open_outcomes(campaign)
         found = _judged(campaign, name, wanted, placed, rule, off | unsure)
@@ -344,10 +344,11 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
             "one): smaller steps, or more elements, settle it"
         )
     if unsure:
+        which = f"whether {'all' if name == OUTCOME else 'so many'} latches catch"
         told.append(
-            f"{name}: in {counted(unsure, 'sample')} it is uncertain whether all latches catch, as "
-            "another joint locks in the same step, or the rate's numerical error decides it: "
-            "smaller steps settle it"
+            f"{name}: in {counted(unsure, 'sample')} it is uncertain {which}, as another joint "
+            "locks in the same step, or the rate's numerical error decides it: smaller steps "
+            "settle it"
         )
     return told
 

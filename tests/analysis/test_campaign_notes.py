@@ -291,6 +291,20 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
         notes = verdict_table(analyse(unsure, wanted)).notes
         (note,) = (each for each in notes if "uncertain whether" in each)
         assert note.startswith(f"outcome: in {count} samples it is uncertain")
+    # Of four latches, the second of which is in doubt, three may be all there are or four: a latch
+    # that has missed can only be won, and one that has caught only be lost.
+    for caught, least, open_ in ((1, 4.0, True), (1, 3.0, False), (0, 4.0, True), (0, 5.0, False)):
+        latched = np.ones((30, 2, 4), dtype=int)
+        latched[:, 0, 2] = caught
+        counted = unsure.assign(
+            latched=(("sample", "plane", "section"), latched),
+            latched_joints=("sample", np.full(30, 3.0 + caught)),
+        )
+        so_many = {"latched_joints": {"min": least, "probability": 0.8, "confidence": 0.9}}
+        found = analyse(counted, so_many)
+        assert found["samples_unsure"].item() == 30 * open_
+        told = "latched_joints: in 30 samples it is uncertain whether so many latches catch"
+        assert any(n.startswith(told) for n in verdict_table(found).notes) == open_
     # No latch of a ring that stalled before its stops is in doubt.
     made["outcome"].values[:3] = Fate.STALLED
     (note,) = [n for n in verdict_table(analyse(made, wanted)).notes if "uncertain whether" in n]
