@@ -513,8 +513,8 @@ def open_outcomes(campaign: xr.Dataset) -> Mask:
     missed = 0.0 * won
     if "latched" in campaign:
         missed = (campaign["latched"].to_numpy() == 0).sum(axis=(1, 2))
-    caught = (fate == Fate.NOT_LATCHED) & (lost + won > 0.0) & (missed <= won)
-    return np.asarray(caught | ((fate == Fate.DEPLOYED) & (lost > 0.0)))
+    some = (lost + won > 0.0) & (missed <= won)
+    return np.asarray(some & np.isin(fate, [Fate.DEPLOYED, Fate.NOT_LATCHED]))
 
 
 def _slow(campaign: xr.Dataset) -> NDArray[np.bool_]:
