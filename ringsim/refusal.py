@@ -254,17 +254,18 @@ def _meant(text: str, kind: str, wanted: str) -> str:
 
     >>> _meant("100MPa", "float_type", "Pa"), _meant("2 knots", "float_type", "m/s")
     ('1e+08', 'the number alone')
-    >>> _meant("60 C", "float_type", "K")
-    '333.15'
+    >>> _meant("60 C", "float_type", "K"), _meant(".5", "float_type", "m")
+    ('333.15', '0.5')
     """
     if kind.startswith("bool"):
         return {"true": "true", "yes": "true", "false": "false", "no": "false"}.get(
             text.lower(), ""
         )
-    number = re.match(r"[-+]?\d+([.,]\d+)?(e[-+]?\d+)?", text.strip(), re.IGNORECASE)
+    number = re.match(r"[-+]?(\d+([.,]\d+)?|[.,]\d+)(e[-+]?\d+)?", text.strip(), re.IGNORECASE)
     if not number or not kind.startswith("float"):
         return ""
     alone, behind = number[0].replace(",", "."), text.strip()[number.end() :].strip()
+    alone = re.sub(r"^([-+]?)\.", r"\g<1>0.", alone)  # TOML has no .5
     behind = re.sub("degrees?|\u00b0$", "deg", behind)
     if not behind or behind == wanted:
         return alone

@@ -347,8 +347,8 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         which = f"whether {'all' if name == OUTCOME else 'so many'} latches catch"
         told.append(
             f"{name}: in {counted(unsure, 'sample')} it is uncertain {which}, as another joint "
-            "locks in the same step, or the rate's numerical error decides it: smaller steps "
-            "settle it"
+            "locked within two steps before, or the rate's numerical error decides it: smaller "
+            "steps settle it"
         )
     return told
 

@@ -414,6 +414,8 @@ def _next(campaign: Folder, left: int, growth: str) -> str:
     if runs_in(campaign.path):
         if not left and not len(campaign.unchecked()):
             return "wait: the results of all samples are being merged, and figures drawn"
+        if not np.isfinite(campaign.survey().seconds).any():
+            return "wait: no sample has ended yet"
         return f"wait; ringsim merge {folder} gives the results so far"
     if left or len(campaign.unchecked()) or (growth and not (campaign.path / MERGED).exists()):
         return f"ringsim campaign FILE --out {folder} continues it"

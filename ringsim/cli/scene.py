@@ -355,7 +355,7 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least(), _parted(scene))}"
         if drive.least().margin < 0.0 and math.isfinite(more := drive.pull_needed()):
-            by = _by_motors(scene)
+            by = _by_motors(scene) + "; one plane alone may take more" * (not _alike(scene))
             yield f"  a margin of 0 takes {more:.3g} times the pull of all winches{by}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
 
@@ -478,6 +478,12 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
             f"of what drives with the standard's factors, against half of what resists: "
             f"{_verdict(least, _parted(scene))}"
         )
+
+
+def _alike(scene: Scene) -> bool:
+    """Whether there is one cable, or two that are alike."""
+    cables = scene.cables
+    return cables is None or None in (cables.upper, cables.lower) or _equal(scene)
 
 
 def _by_motors(scene: Scene) -> str:

@@ -448,3 +448,11 @@ def test_solver_process_knows_neither_mpi_nor_xarray_nor_matplotlib(ranks, bench
     bench.run("campaign", bench.write(2), "--out", "out", ranks=ranks, solver="fake_solver:spy",
               fresh=True)  # fmt: skip
     assert set(bench.result("out").reason.values) == {"clean"}
+
+
+def test_status_advises_no_merge_before_a_sample_has_ended(copied, monkeypatch):
+    """Checks run first, and of them alone there is nothing to merge."""
+    monkeypatch.setattr("ringsim.campaign.plan.runs_in", lambda _: True)
+    for gone, told in ((range(1, 99), "gives the results so far"), (range(99), "no sample has")):
+        lose(copied, gone)
+        assert told in status_lines(open_folder(copied.folder / "out"))[-1]

@@ -285,7 +285,8 @@ def test_so_many_times_the_torque_give_a_margin_of_zero(weak: float) -> None:
     torques["cables.lower.winch.winding.stall_torque"] *= weak
     scene = load_scene("ring18-motor").with_values(torques)
     (told,) = (line for line in margin_lines(scene) if "a margin of 0 takes" in line)
-    assert told.endswith("times the pull of all winches, as so many times their stall_torque give")
+    words = "times the pull of all winches, as so many times their stall_torque give"
+    assert told.endswith(f"{words}{'; one plane alone may take more' * (weak < 1.0)}")
     assert scene.margin is not None
     drive = DriveMargin(scene, scene.margin)
     more = drive.pull_needed()
