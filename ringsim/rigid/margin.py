@@ -178,7 +178,7 @@ class DriveMargin:
         """
         most = 0.0
         for now in (*self.course(), self.least()):
-            if now.margin == -1.0:  # as ``_margin`` has it of both
+            if now.margin == -1.0:  # nothing drives, or whatever pulls is held
                 return math.inf
             if now.required > 0.0:
                 pull = float(now.pulls[1].sum())
