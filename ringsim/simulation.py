@@ -236,7 +236,7 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
     else:
         # What stops short with little friction does so with all of it.
         off = "asynchrony_max, peak_tension"
-        if np.isfinite(values["deployment_time"]):
+        if np.isfinite(values.get("deployment_time", np.nan)):  # not of what never locks
             off = "asynchrony_max, deployment_time, outcome, peak_tension"
         remark = (
             f"; {SMOOTHED}: the ring moves too easily, and tensions are up to {max(excesses):.0f} "

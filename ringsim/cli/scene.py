@@ -356,7 +356,8 @@ def margin_lines(scene: Scene) -> Iterator[str]:
         yield f"{name}: {_verdict(drive.least(), _parted(scene))}"
         if drive.least().margin < 0.0 and math.isfinite(more := drive.pull_needed()):
             by = _by_motors(scene) + "; one plane alone may take more" * (not _alike(scene))
-            yield f"  a margin of 0 takes {more:.3g} times the pull of all winches{by}"
+            about = "about " * any(cable.friction.loads for cable in drive.drive.cables)
+            yield f"  a margin of 0 takes {about}{more:.3g} times the pull of all winches{by}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
 
 

@@ -174,7 +174,8 @@ class DriveMargin:
 
     def pull_needed(self) -> float:
         """How many times as much all winches must pull for a margin of 0 at every angle: what else
-        drives stays as it is.  Infinite where none pulls, or a joint holds.
+        drives stays as it is.  Infinite where none pulls, or a joint holds; an estimate where the
+        friction of pulleys depends on the tension.
         """
         most = 0.0
         for now in (*self.course(), self.least()):
@@ -183,7 +184,9 @@ class DriveMargin:
             if now.required > 0.0:
                 pull = float(now.pulls[1].sum())
                 wanted = now.required - (now.counted - pull)
-                most = max(most, wanted / pull if pull > 0.0 else math.inf * (wanted > 0.0))
+                if pull <= 0.0 < wanted:
+                    return math.inf
+                most = max(most, wanted / pull if pull > 0.0 else 0.0)
         return most
 
     def _angles(self, low: float, high: float, count: int = 33) -> Array:
