@@ -106,6 +106,15 @@ def number_text(value: float, digits: int = 4) -> str:
     return without_power(f"{value:.{digits}g}", value) if math.isfinite(value) else "-"
 
 
+def thousandths(margin: float) -> str:
+    """Three decimals of a margin, but never a 0 that is none: its sign is the verdict.
+
+    >>> thousandths(-0.8691), thousandths(-0.00002), thousandths(0.0)
+    ('-0.869', '-2.0e-05', '0.000')
+    """
+    return f"{margin:.1e}" if 0.0 < abs(margin) < 0.0005 else f"{margin:.3f}"
+
+
 def without_power(text: str, value: float) -> str:
     """A number in words as people write it below a million: 1092, not 1.09e+03."""
     return f"{value:.0f}" if re.search(r"e\+0[1-5]$", text) else text

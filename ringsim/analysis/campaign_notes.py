@@ -52,6 +52,7 @@ from ringsim.tables import (
     known_to,
     number_text,
     readable,
+    thousandths,
     with_unit,
 )
 from ringsim.variables import AT_REST, GO_ON, Fate, Variable
@@ -183,9 +184,9 @@ _STARTED = "_started"
 
 
 def plane_margin(campaign: xr.Dataset) -> str:
-    """The output with the margin of one plane's own cable, where its least of all samples is less
-    than that of both together, or more samples have less than none; empty if it is not so.  From
-    the start of the last winch on where one starts late: before it one plane has no drive.
+    """The output with the margin of one plane's own cable, where its least is less than that of
+    both together, or more samples have less than none; else empty.  From the start of the last
+    winch on where one starts late: before it one plane has no drive.
     """
     before, later = (numbers(campaign, f"least_plane_margin{end}") for end in ("", _STARTED))
     late = _STARTED * bool((later > before)[good(campaign)].any())
@@ -210,15 +211,13 @@ def plane_line(campaign: xr.Dataset) -> str:
     word += " for a rigid ring" * (not short and bool(rigid_line(campaign)))
     when = " from the start of the last winch on" * name.endswith(_STARTED)
     return (
-        f"the least drive margin of one plane's own cable{when} is {own[k]:.3f} "
+        f"the least drive margin of one plane's own cable{when} is {thousandths(own[k])} "
         f"(sample {int(campaign['sample'][k])}): {word}"
     )
 
 
 def rigid_line(campaign: xr.Dataset) -> str:
-    """In how many samples the least drive margin is enough, and the ring came to rest all the same
-    while it was driven; empty if in none.
-    """
+    """In how many samples a driven ring came to rest with a margin that is enough; or empty."""
     margin = numbers(campaign, "least_drive_margin")
     known = good(campaign) & np.isfinite(margin)
     if OUTCOME not in campaign or not known.any():

@@ -36,7 +36,14 @@ from ringsim.campaign.watch import (
 )
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.slot import Local, Serial
-from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost
+from ringsim.execution.work import (
+    Allowance,
+    Scheduler,
+    Work,
+    longest_first,
+    relative_cost,
+    with_checks,
+)
 from ringsim.files import DESIGN, MERGED, write_text, writing
 from ringsim.refusal import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED, InputError
 from ringsim.sampling.designs.levels import SubsetSimulation
@@ -202,7 +209,7 @@ def _watched(
         return stop.reason
 
     samples = longest_first(missing, relative_cost(campaign.table, campaign.scene))
-    samples = watch.in_order(checks + samples)  # checks first: the full engine takes longest
+    samples = watch.in_order(with_checks(samples, checks, choices.scheduler.workers))
     work = replace(work, started=progress.started, finished=finished, stop=asked)
     return samples, progress, work
 

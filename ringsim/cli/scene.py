@@ -37,7 +37,7 @@ from ringsim.rigid.margin import (
 from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
 from ringsim.scene.checks import doubtful
 from ringsim.scene.substituted import strained, substituted
-from ringsim.tables import counted, text_table, unit_text
+from ringsim.tables import counted, text_table, thousandths, unit_text
 from ringsim.units import Model
 from ringsim.variables import Variable
 
@@ -498,14 +498,16 @@ def _by_motors(scene: Scene) -> str:
 
 def _told(margin: float) -> str:
     """A dash where next to nothing resists."""
-    return f"{margin:.3f}" if margin < MOST else "-"
+    return thousandths(margin) if margin < MOST else "-"
 
 
 def _verdict(least: Margin, parted: bool = False) -> str:
     if least.margin >= MOST:
         return "nothing resists"
     word = f"enough{' for a rigid ring' * parted}" if least.margin >= 0.0 else "NOT enough"
-    return f"least margin {least.margin:.3f} at {math.degrees(least.angle):.2f} deg: {word}"
+    return (
+        f"least margin {thousandths(least.margin)} at {math.degrees(least.angle):.2f} deg: {word}"
+    )
 
 
 def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:

@@ -138,6 +138,22 @@ def longest_first(samples: NDArray[np.int64], cost: Array) -> list[int]:
     return [int(sample) for sample in samples[np.argsort(-cost[samples], kind="stable")]]
 
 
+def with_checks(samples: Sequence[int], checks: Sequence[int], workers: int) -> list[int]:
+    """Samples in their order, and checks evenly among the first half of them.
+
+    A check takes as long as dozens of samples: where all came first, nothing else would be known
+    for minutes; where they came last, workers would wait for each other.
+
+    >>> with_checks([0, 1, 2, 3, 4, 5, 6, 7], [-1, -5], workers=1)
+    [0, -1, 1, 2, -5, 3, 4, 5, 6, 7]
+    """
+    first = min(workers, len(samples))  # each worker begins with a sample
+    step = max(len(samples) / 2 - first, 0.0) / max(len(checks), 1)
+    places = [*range(len(samples)), *(first - 0.5 + step * check for check in range(len(checks)))]
+    order = np.argsort(places, kind="stable")
+    return [[*samples, *checks][place] for place in order]
+
+
 # One run, whatever happens in it: a result with a status, never an exception.
 
 

@@ -16,6 +16,7 @@ from ringsim.outputs.family import Array
 from ringsim.plots import picture, style
 from ringsim.plots.run import mark, peak_of
 from ringsim.scene import Scene, scene_from_toml
+from ringsim.tables import thousandths
 
 _SOURCES = (
     style.SKY, style.ORANGE, style.GREEN, style.VERMILION, style.PURPLE, style.BLUE, style.GREY,
@@ -69,10 +70,10 @@ def drive(dataset: xr.Dataset) -> Figure:
     told = []
     if np.isfinite(margin).any():
         lower.plot(where, least, "o", color=style.VERMILION, markersize=6, zorder=4)
-        told = [f"least margin {least:.3f} at {where:.0f} deg"]
+        told = [f"least margin {thousandths(least)} at {where:.0f} deg"]
         # By as much as the summary of a run tells it.
         if (plane := float(dataset.get("least_plane_margin", np.nan))) < least - 5e-3:
-            told[0] += f", of one plane's own cable {plane:.3f}"
+            told[0] += f", of one plane's own cable {thousandths(plane)}"
     if (known["time"] >= stopped).any():
         told.append(f"no margin from {stopped:.4g} s on: all winches have stopped")
     words = "; ".join(told)  # inside it would lie on the curve

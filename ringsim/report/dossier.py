@@ -482,6 +482,11 @@ def _pedigree(of: Of) -> Answer:
     words = _ORIGINS if head else _ORIGINS | {"scene": _UNTOLD}
     told = ", ".join(f"{counts[k]} {word}" for k, word in words.items() if counts[k])
     found = Answer([f"{counts.total()} values: {told}", *drawn_lines(of, lambda *_: True)])
+    found.result += [
+        f"{each.path} = {each.value}, set by the campaign"
+        for each in values
+        if each.origin == "campaign"
+    ]
     found.evidence.append("ringsim report lists every value and its origin")
     found.result += learnt_lines(of.campaign)
     if not learnt_lines(of.campaign):

@@ -33,8 +33,8 @@ _STILL = 1e-12
 def resting(missing: str, window: float) -> str:
     """Why a run ends at rest, by who has locked and the window (s) that was watched."""
     return (
-        f"came to rest with {missing}: no winch moves the ring, and within {window:.3g} s "
-        f"no V-joint has moved by more than {math.degrees(MOVED):.2g} deg"
+        f"came to rest with {missing}: no winch moves the ring, and every V-joint has kept within "
+        f"{math.degrees(MOVED):.2g} deg for {window:.3g} s, which counts as rest"
     )
 
 

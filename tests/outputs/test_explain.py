@@ -52,6 +52,13 @@ def test_names_beside_an_unknown_one_are_explained() -> None:
 def test_words_of_tables_are_explained() -> None:
     assert explain("Samples to go").startswith("samples to go: how many more samples")
     assert explain("posteriors").startswith("posterior: what is known")
+    # A head of a table is told without what it is of.
+    for head, known in (
+        ("verdict in flight", "verdict"), ("sampling (standard error)", "sampling"),
+        ("error of the mean of", "error of the mean"), ("95 % interval of it", "interval"),
+        ("of the first 25 %", "of the first"), ("95 %", "quantile"),
+    ):  # fmt: skip
+        assert explain(head).startswith(f"{known}: {WORDS[known]}")
     # A word that is a key, too, is told as both.
     assert "clock: offset and drift" in explain("clock")
     assert "clock (measured file)" in explain("clock")

@@ -19,6 +19,7 @@ from ringsim.analysis.design import (
     values_of,
 )
 from ringsim.analysis.intervals import good, used
+from ringsim.analysis.requirements import MARGINS, required_by
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import picture, style
 from ringsim.plots.campaign.frame import (
@@ -172,13 +173,16 @@ _ANGLES = 161
     ("drive_margin", "least_drive_margin", "opening_angle"),
 )  # fmt: skip
 def margin(campaign: xr.Dataset) -> Figure:
-    """``least_drive_margin`` (sample) by ending; below, ``drive_margin`` (sample, time) over the
-    mean opening angle, until the last winch has stopped: see ``drive_end``.
+    """``least_drive_margin`` (sample), or the least margin that is required, by ending; below,
+    ``drive_margin`` (sample, time) over the mean opening angle, until the last winch has stopped:
+    see ``drive_end``.
     """
     figure = Figure(figsize=(8.6, 6.2))
     upper, lower = figure.subplots(2, 1, height_ratios=(2, 3))
-    samples, values = values_of(campaign, "least_drive_margin")
-    _strips(upper, campaign, samples, values)
+    wanted = required_by(campaign.attrs)
+    name = next((name for name in MARGINS if name in wanted and name in campaign), MARGINS[0])
+    samples, values = values_of(campaign, name)
+    _strips(upper, campaign, name, samples, values)
     read, words = chosen(campaign, ["drive_margin", "opening_angle"])
     angles = read["opening_angle"].mean(("plane", "section")).transpose("sample", "time").to_numpy()
     margins = read["drive_margin"].transpose("sample", "time")
@@ -213,8 +217,8 @@ def margin(campaign: xr.Dataset) -> Figure:
     return figure
 
 
-def _strips(axes: Axes, campaign: xr.Dataset, samples: Array, values: Array) -> None:
-    """A row an ending, a mark a sample at its smallest margin; limits of the campaign."""
+def _strips(axes: Axes, campaign: xr.Dataset, name: str, samples: Array, values: Array) -> None:
+    """A row an ending, a mark a sample at its smallest margin of a kind; limits of the campaign."""
     words = endings(campaign)[np.searchsorted(campaign["sample"].to_numpy(), samples)]
     shown = looks_of(words)
     for row, (word, (colour, marker)) in enumerate(shown.items()):
@@ -225,14 +229,14 @@ def _strips(axes: Axes, campaign: xr.Dataset, samples: Array, values: Array) -> 
     axes.set_yticks(range(len(shown)), [f"{word} ({(words == word).sum()})" for word in shown])
     axes.set_ylim(len(shown) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
-    for _, limit in limits(campaign, "least_drive_margin"):
+    for _, limit in limits(campaign, name):
         axes.axvline(limit, color=style.VERMILION, linewidth=1.3)
         axes.annotate(f"required {limit:g}", (limit, 1.0), rotation=0, ha="center", va="bottom",
                       color=style.VERMILION, fontsize=9,
                       xycoords=axes.get_xaxis_transform())  # fmt: skip
     if values.size and values.min() < 0.0 < values.max():
         axes.axvline(0.0, **_ZERO)
-    axes.set_xlabel(style.label(campaign["least_drive_margin"]))
+    axes.set_xlabel(style.label(campaign[name]))
 
 
 def _over_angle(angle: Array, margins: Array) -> tuple[Array, Array]:
