@@ -29,7 +29,7 @@ from ringsim.plots.campaign.frame import ALL_ALIKE, moves, shown
 from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
 from ringsim.plots.campaign.tornado import bars_of, named, one_by_one
 from ringsim.plots.figures import PICTURES, figures_of
-from ringsim.variables import Fate
+from ringsim.variables import Fate, Status
 
 GOOD = [0, 1, 3, 4, 6]
 
@@ -306,6 +306,18 @@ def test_the_margin_by_ending_and_over_the_angle() -> None:
     wanted = {"least_drive_margin": {"min": -0.3, "probability": 0.9, "confidence": 0.9}}
     campaign.attrs["requirements"] = json.dumps(wanted)
     assert [t.get_text() for t in margin(campaign).axes[0].texts] == ["required -0.3"]
+    # What is required of another margin is drawn at the marks of that one.
+    started = campaign["least_drive_margin"] + 0.25
+    campaign["least_drive_margin_started"] = started.assign_attrs(long_name="from the last start")
+    campaign.attrs["requirements"] = json.dumps(
+        {"least_drive_margin_started": wanted.pop("least_drive_margin") | {"min": 0.0}}
+    )
+    upper = margin(campaign).axes[0]
+    assert [t.get_text() for t in upper.texts] == ["required 0"]
+    assert "from the last start" in upper.get_xlabel().lower()
+    marks = np.concatenate([each.get_offsets()[:, 0] for each in upper.collections])
+    ran = started.values[(campaign["status"] == Status.OK).values]
+    np.testing.assert_allclose(np.sort(marks), np.sort(ran), atol=1e-12)
 
 
 def test_the_band_of_margins_ends_where_the_first_deployed_sample_has_its_last_record() -> None:
