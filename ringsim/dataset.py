@@ -221,6 +221,11 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
     }
 
 
+def _counts(values: np.ndarray[Any, Any]) -> bool:
+    """Whether all are whole or missing: the mean of a count, as of an analysis, is none."""
+    return bool((np.isnan(values) | (values == np.rint(values))).all())
+
+
 def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
     encoding: dict[str, dict[str, Any]] = {}
     for name, variable in dataset.variables.items():
@@ -228,7 +233,7 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
         declared = VARIABLES.get(str(name))
         if variable.dtype.kind == "f" and name not in dataset.coords:
             chosen["_FillValue"] = np.nan
-            if declared is not None and declared.dtype.startswith("i"):
+            if declared is not None and declared.dtype.startswith("i") and _counts(variable.values):
                 chosen = {"dtype": declared.dtype, "_FillValue": -1}
         if variable.ndim > 0 and variable.dtype.kind in "fiub":
             chosen |= {"zlib": True, "complevel": 4, "shuffle": True}

@@ -36,7 +36,6 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.requirements import OUTCOME, Requirement, rule_of, violations
 from ringsim.analysis.verdicts import Verdict, verdict_of
-from ringsim.choice import kind_of
 from ringsim.files import parse_toml
 from ringsim.overrides import parse_value
 from ringsim.refusal import InputError, explain, known_or_nearest, show
@@ -492,10 +491,7 @@ def reweight(
         found |= _verdicts(campaign, requirements, placed, weights, pairs)
     found["effective_samples"] = (), count, about("effective samples of all that ran")
     found["reweighted_samples"] = (), int(run.sum()), {"long_name": "samples that ran"}
-    laws = {
-        path: {"kind": kind_of(law), **law.model_dump(exclude_defaults=True)}
-        for path, law in wanted.items()
-    }
+    laws = {path: law.model_dump(mode="json", exclude_none=True) for path, law in wanted.items()}
     found["reweighted_to"] = (), json.dumps(laws), {"long_name": "distributions by path (JSON)"}
     coords = {
         "reweighted_statistic": [*REWEIGHTED_STATISTICS], "event": np.array(words, dtype=object),

@@ -348,7 +348,7 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         told.append(
             f"{name}: in {counted(unsure, 'sample')} it is uncertain {which}, as another joint "
             "locked within two steps before, or the rate's numerical error decides it: smaller "
-            "steps settle it"
+            "steps settle the first, smaller steps or more elements the second"
         )
     return told
 
@@ -534,7 +534,8 @@ def _held(each: Sequence[Mapping[str, Any]]) -> list[str]:
         share = "" if chosen else f" in {one['probability_required']:g} of all"
         known = f" ({', '.join(said)})" * bool(said)
         told.setdefault(words, []).append(f"{one['requirement_text']}{share}{known}")
-    return [f"requirements {words}: {'; '.join(texts)}" for words, texts in told.items()]
+    plural = {of: of.replace(" its ", " their ") for of, texts in told.items() if len(texts) > 1}
+    return [f"requirements {plural.get(of, of)}: {'; '.join(told[of])}" for of in told]
 
 
 def _number(name: str, cell: Mapping[str, str], parts: Parts) -> str:

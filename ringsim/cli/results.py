@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import notes
@@ -245,7 +246,12 @@ def _write(
 
 def _load(file: Path) -> xr.Dataset:
     try:
-        return xr.load_dataset(file, engine="netcdf4")
+        found = xr.load_dataset(file, engine="netcdf4")
+        # A file gives numbers back as numpy's, whose truths are no numbers to multiply a word with.
+        found.attrs = {
+            n: v.item() if isinstance(v, np.generic) else v for n, v in found.attrs.items()
+        }
+        return found
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(

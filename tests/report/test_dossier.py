@@ -171,6 +171,14 @@ def summed(file: File, said: re.Match[str]) -> None:
     assert sum(parts) == int(said["count"])
 
 
+def setting(file: File, said: re.Match[str]) -> None:
+    value: object = file.scene
+    for key in said["path"].split("."):
+        assert isinstance(value, dict)
+        value = value[key]
+    assert json.dumps(value) == said["value"]
+
+
 def held(file: File, said: re.Match[str]) -> None:
     assert int(said["count"]) == int(file.ok.sum())
 
@@ -216,6 +224,7 @@ KNOWN = {
     r"\((?P<ends>.+)\)": matters,
     rf"(?P<name>[\w.]+): uniform, low 0, high 1; values: (?P<low>{N}) to (?P<high>{N}) m": drawn,
     r"(?P<count>\d+) values: (?P<parts>.+)": summed,
+    r"(?P<path>[\w.]+) = (?P<value>.+), set by the campaign": setting,
     r"(peak_tension): largest of .*": anything,  # as in its row
     r"(?P<count>\d+) samples": held,
     rf"a run is refused whose imbalance exceeds (?P<most>{N})": tolerance,

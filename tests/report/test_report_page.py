@@ -447,6 +447,26 @@ def test_the_verb(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("_undrawn")
+def test_a_stored_analysis_gives_the_page_of_a_new_one(tmp_path: Path) -> None:
+    """To the last letter: a file gives back other kinds of numbers than an analysis has."""
+    campaign = made_campaign(12, failed=(3,), stalled=(1, 4, 7))
+    campaign["status"][{"sample": 11}] = -1  # one is still to run
+    locked = np.where(campaign["status"] == 0, 12.0 - campaign["sample"] % 4, np.nan)
+    campaign["locked_joints"] = "sample", locked, {"units": "1"}
+    save(campaign, tmp_path / "campaign.nc")
+    stored, first, second = (str(tmp_path / name) for name in ("a.nc", "1.html", "2.html"))
+    assert CliRunner().invoke(cli, ["analyse", str(tmp_path), "--out", stored]).exit_code == 0
+    assert run(str(tmp_path), "--out", first)[0] == EXIT_DONE
+    assert run(str(tmp_path), "--out", second, "--analysis", stored)[0] == EXIT_DONE
+    assert Path(first).read_text() == Path(second).read_text()
+    with xr.open_dataset(stored) as found:
+        mean = found["locked_joints"].sel(statistic="mean").item()
+    ran = campaign["locked_joints"].values[campaign["status"].values == 0]
+    assert mean == pytest.approx(ran.mean())
+    assert mean != round(mean)  # a count's mean is none
+
+
+@pytest.mark.usefixtures("_undrawn")
 def test_verdicts_are_those_of_the_analysis_and_nothing_counts_again() -> None:
     campaign = made_campaign(8, failed=(2, 5), stalled=(4,))
     text, found = page(campaign, "runs/made"), analyse(campaign)
