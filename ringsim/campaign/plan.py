@@ -213,6 +213,7 @@ def _predicted(
         if column.path == _BARS and column.values.dtype.kind == "b":
             barred = column.values[todo]
     ends = _span(each[~barred] if not barred.all() else each)
+    basis = "with error bars, " * bool(barred.all()) + basis
     if barred.any() and not barred.all():
         ends += f"; with error bars {_span(each[barred])}"
     spread = f" ({ends})" if each.min() < each.max() else ""

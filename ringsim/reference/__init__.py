@@ -51,6 +51,8 @@ WORDS = {
     "were drawn; it says nothing of numerical errors",
     "lag": "how far the opening angle of a joint is from the mean of all at that time; of a motor "
     "how long it is slower than commanded",
+    "kind": "which of several forms a table has, such as a law of an input; explain of the table's "
+    "key lists them",
     "largest bar": "the largest error bar of a sample, and which sample has it",
     "largest difference": "the largest difference between the engines, and in which sample",
     "largest difference of a pair": "the largest, by its size, of the differences of the second "
@@ -58,9 +60,12 @@ WORDS = {
     "least": "the smallest value of all samples used",
     "learnt": "what is left of an unknown's scatter, see remaining scatter",
     "limit": "a bound on an output, from requirements or from limits of the scene",
+    "law": "the distribution of an input; explain inputs lists all kinds",
     "mean": "sum over the samples used by their number",
     "median": "see quantile",
     "most": "the largest value of all samples used",
+    "median sample": "the sample in the middle by asynchrony_max, or deployment_time where there "
+    "is none: of all, or of those that ended alike",
     "met": "the samples show, at the confidence asked for, that the probability is as required",
     "not met": "the samples show, at the confidence asked for, that it is not",
     "lock order": "figure of which V-joint locks first, second, ... and last, in how many samples",

@@ -34,7 +34,7 @@ def resting(missing: str, window: float) -> str:
     """Why a run ends at rest, by who has locked and the window (s) that was watched."""
     return (
         f"came to rest with {missing}: no winch moves the ring, and every V-joint has kept within "
-        f"{math.degrees(MOVED):.2g} deg for {window:.3g} s, which counts as rest"
+        f"{math.degrees(MOVED):.2g} deg for {window:.3g} s"
     )
 
 

@@ -118,7 +118,7 @@ def over_time(
     curves: Sequence[Array], words: NDArray[np.str_],
 ) -> str:  # fmt: skip
     """A panel a set of curves (sample, time) of what was ``read`` of a campaign, up to the last
-    time at which any is known, or where nearly all samples are over: a sentence on the others.
+    time at which any is known, or where nearly all samples are over: sentences on the others.
     """
     time, last = read["time"].to_numpy(), 0
     cases, samples = looks_of_cases(campaign, read["sample"].values), read["sample"].to_numpy()
@@ -134,7 +134,11 @@ def over_time(
     panels[0].set_xlim(time[0], min(time[max(last, 1)], until))
     panels[-1].set_xlabel(style.label(read["time"]))
     legend(figure, panels, 4)
-    return ran_on
+    shrinks = not cases and any(
+        np.isfinite(own[:, last] if own.size else own).sum() < len(own)
+        for values in curves for word in looks_of(words) for own in [values[words == word]]
+    )  # fmt: skip
+    return ran_on + " Bands are of the samples not yet over." * shrinks
 
 
 _WORDS = {"base_force": "force at the base", "base_torque": "torque at the base"}
