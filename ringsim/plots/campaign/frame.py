@@ -432,13 +432,21 @@ WIDE = 34
 
 
 def in_lines(name: str) -> str:
-    """A name on two lines of bearable length, the path on one of its own; three would overlap."""
+    """A name on two lines of bearable length, the path on one of its own; three would overlap.
+
+    >>> in_lines("difference of cables.upper/lower.winch.winding.stall_torque")
+    'difference of cables.upper/lower.\\nwinch.winding.stall_torque'
+    """
     name = style.plain(name)
     if len(name) <= WIDE:
         return name
     # "mean of PATH", "section 3 of PATH", and "sections 5 to 8 of PATH".
     if whole := re.fullmatch(r"(\w[\w ]* of) (\S+)", name):
-        return f"{whole[1]}\n{whole[2]}"
+        if len(whole[2]) <= WIDE:
+            return f"{whole[1]}\n{whole[2]}"
+        breaks = [each.end() for each in re.finditer(r" of |\.", name)]
+        at = min(breaks, key=lambda at: max(at, len(name) - at))
+        return f"{name[:at].rstrip()}\n{name[at:]}"
     path, bracket, place = name.partition("[")
     # Between the parts of a path rather than within a word.
     apart = textwrap.fill(path.replace(".", ". "), WIDE).replace(". ", ".")
