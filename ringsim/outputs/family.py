@@ -447,6 +447,8 @@ def _declared(output: type[Output]) -> dict[str, Variable]:
             name, words = f"{one.name}_error", f"numerical error bar of the {one.error_bar.words}"
             dims = one.dims if one.dims == ("time",) else ()
             words += " at any time up to then" if dims else ""
+            if of := one.error_bar.of:
+                words += f", from the difference of {of} over all places where that is larger"
             needs = ("error bars", *output.needs)
             found[name] = Variable(name, dims, one.units, words, needs=needs)
     return found

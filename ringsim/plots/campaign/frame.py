@@ -432,10 +432,10 @@ WIDE = 34
 
 
 def in_lines(name: str) -> str:
-    """A name on two lines of bearable length, the path on one of its own; three would overlap.
+    r"""A name on two lines of bearable length, the path on one of its own; three would overlap.
 
     >>> in_lines("difference of cables.upper/lower.winch.winding.stall_torque")
-    'difference of cables.upper/lower.\\nwinch.winding.stall_torque'
+    'difference of cables.upper/lower.\nwinch.winding.stall_torque'
     """
     name = style.plain(name)
     if len(name) <= WIDE:
