@@ -294,6 +294,14 @@ def judged_by(campaign: xr.Dataset) -> str:
     return next((n for n in ("asynchrony_max", "deployment_time") if n in names), "")
 
 
+def worst_is_largest(analysis: xr.Dataset, name: str) -> bool:
+    """Whether the worst sample of an output, by itself or by what is required of it, is the one
+    with the largest value.
+    """
+    worst = int(analysis[f"{name}_worst_sample"])
+    return worst >= 0 and worst == int(analysis[f"{name}_end_sample"][1])
+
+
 def median_and_worst(campaign: xr.Dataset) -> tuple[int, int] | None:
     """The samples in the middle and at the worst end of that order; None if no sample is used."""
     if not (name := judged_by(campaign)):

@@ -20,7 +20,7 @@ from ringsim.analysis.campaign_notes import (
     opened,
 )
 from ringsim.analysis.derived import of_opening
-from ringsim.analysis.design import Placement
+from ringsim.analysis.design import Placement, worst_is_largest
 from ringsim.analysis.intervals import (
     Interval,
     Mask,
@@ -494,7 +494,7 @@ def in_short(analysis: xr.Dataset, parts: Parts) -> list[str]:
     cells = {row[0].partition(" ")[0]: dict(zip(head, row, strict=True)) for row in rows}
     chosen = [name for name in names if name in cells or name in parts.strongest]
     chosen = chosen or [name for name in parts.strongest if name in quantities()][:_MOST_NAMED]
-    told += filter(None, (_number(name, cells.get(name, {}), parts) for name in chosen))
+    told += filter(None, (_number(analysis, name, cells.get(name, {}), parts) for name in chosen))
     told += [
         f"{re.sub('^violates', 'samples that violate', group)} differ by {row[1]}: {row[2]}"
         for row in parts.separated.rows
@@ -538,11 +538,11 @@ def _held(each: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"requirements {plural.get(of, of)}: {'; '.join(told[of])}" for of in told]
 
 
-def _number(name: str, cell: Mapping[str, str], parts: Parts) -> str:
+def _number(analysis: xr.Dataset, name: str, cell: Mapping[str, str], parts: Parts) -> str:
     """Mean and worst value of an output, and the inputs that go with it; empty without either."""
     said = []
     if (sample := cell.get("worst sample", "-")) != "-":
-        ends = {"mean": "mean", "worst": "most" if quantities()[name].badness > 0 else "least"}
+        ends = {"mean": "mean", "worst": "most" if worst_is_largest(analysis, name) else "least"}
         each = {word: with_unit(cell[head], cell["unit"]) for word, head in ends.items()}
         mean = f"mean {each['mean']}, " * (cell["mean"] != "-")
         said.append(f"{mean}worst {each['worst']} in sample {sample}")

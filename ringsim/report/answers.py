@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import campaign_notes as notes
-from ringsim.analysis.design import by_path
-from ringsim.analysis.intervals import good, numbers, quantities
+from ringsim.analysis.design import by_path, worst_is_largest
+from ringsim.analysis.intervals import good, numbers
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.study_text import outcome_table, unit_of
 from ringsim.analysis.verdicts import BOUND, SHARE_MET, ended_short, verdict_table
@@ -95,14 +95,17 @@ def _still_lacking(scene: Mapping[str, Any], cure: str) -> str:
 
     >>> _still_lacking({"boom.base": "free"}, 'boom.base = "free", record.reactions = true')
     'record.reactions = true'
+    >>> _still_lacking({"a.b": 1}, '[a] or [c], record.reactions = true')
+    'record.reactions = true'
     """
     parts, there = cure.split(", "), set[str]()
     for part in parts:
-        key, _, value = part.partition(" = ")
-        if part.startswith("[") and any(path.startswith(f"{part[1:-1]}.") for path in scene):
-            there.add(part)
-        if value and key in scene and show(scene[key]) == value:
-            there.add(part)
+        for each in part.split(" or "):
+            key, _, value = each.partition(" = ")
+            if each.startswith("[") and any(path.startswith(f"{each[1:-1]}.") for path in scene):
+                there.add(part)
+            if value and key in scene and show(scene[key]) == value:
+                there.add(part)
     keyed = {part for part in parts if part.startswith("[") or " = " in part}
     if keyed and keyed <= there:
         return "no sample has a value"
@@ -112,7 +115,7 @@ def _still_lacking(scene: Mapping[str, Any], cure: str) -> str:
 def output_line(of: Of, name: str) -> str:
     """An output: mean with its interval, the quantile at its worse end, the worst sample."""
     (factor, unit), told = unit_of(of.analysis, name), f"{name}{of.mark}"
-    cell, larger = cells_of([of.numbers], name), quantities()[name].badness > 0
+    cell, larger = cells_of([of.numbers], name), worst_is_largest(of.analysis, name)
     if not cell:
         value = number_text(factor * float(of.analysis[name][-1]))
         return f"{told}: {with_unit(value, unit)} in all samples that have it"

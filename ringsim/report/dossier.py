@@ -544,12 +544,14 @@ def _management(of: Of) -> Answer:
 
 
 _REACTIONS = "record.reactions = true"
+_CARRIED = f'boom.base = "fixed" or [spacecraft], {_REACTIONS}'
+"""Nothing carries a ring whose base is free and has no spacecraft."""
 for _clause, _asks, _cures in (
     ("4.4.2 Mechanism function", "The motion over time, and its tolerances.",
      {"deployment_time": "no sample has deployed", "asynchrony_max": "no angle was recorded"}),
     ("4.7.5.2.2, 4.8.2.12 Loads", "Loads and motion of the spacecraft from the dynamics.",
-     {"peak_base_force": _REACTIONS, "peak_base_torque": _REACTIONS,
-      "base_rotation_max": f'[spacecraft], boom.base = "free", {_REACTIONS}',
+     {"peak_base_force": _CARRIED, "peak_base_torque": _CARRIED,
+      "base_rotation_max": f'boom.base = "free", {_REACTIONS}',
       "base_rate_max": f"[spacecraft], {_REACTIONS}"}),
     ("4.7.5.4.3 i, 4.7.5.4.4 End stops, 4.8.2.11 Shock", "Shocks of latches and stops.",
      {"peak_latch_rate": "stop.latch = true", "peak_lock_impulse": f"{_REACTIONS}, with stops",

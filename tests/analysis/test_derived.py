@@ -411,6 +411,9 @@ def test_what_is_required_on_one_side_tells_which_end_is_worse(
     cure = '; of far_apart, worse = "larger" or "smaller" under [outputs] says it'
     unsaid = any(note.endswith(cure) for note in statistics_table(found).notes)
     assert unsaid == (worst < 0 and not more)
+    short = [line for line in told(found, full=False) if line.startswith("far_apart: mean")]
+    if bound and worst >= 0:  # the samples' values are their numbers
+        assert f"worst {worst} deg in sample {worst}" in short[0]
     one = {"far_apart": bound | BOUND} if bound else {}
     assert int(analyse(made, one)["far_apart_worst_sample"]) == worst
     other = made.assign(far_apart=made["far_apart"] + 1.0)

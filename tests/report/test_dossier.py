@@ -17,6 +17,7 @@ from made_campaign import made_campaign, with_motors
 from read_page import Page
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.outputs.family import holds
 from ringsim.reference import tree
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.report import dossier as subject
@@ -335,14 +336,23 @@ def test_of_one_change_each_the_farthest_is_told() -> None:
 
 @pytest.mark.quick
 def test_a_key_that_is_set_is_no_cure() -> None:
+    """Nothing carries a ring on a free base without a spacecraft, whose rotation is recorded."""
     campaign = made_campaign(4)
-    said = "Missing: peak_base_force (record.reactions = true)"
-    assert said in row(rows_of(campaign), "Loads")["result"].splitlines()
-    campaign.attrs["scene"] = re.sub(
-        "reactions = false", "reactions = true", campaign.attrs["scene"]
-    )
-    said = "Missing: peak_base_force (no sample has a value)"
-    assert said in row(rows_of(campaign), "Loads")["result"].splitlines()
+    on = "record.reactions = true"
+    carries, free = 'boom.base = "fixed" or [spacecraft]', 'boom.base = "free"'
+    for base, records, force, rotation in (
+        ("free", False, f"{carries}, {on}", on),
+        ("free", True, carries, "no sample has a value"),
+        ("fixed", False, on, f"{free}, {on}"),
+        ("fixed", True, "no sample has a value", free),
+    ):
+        values = {"boom.base": base, "record.reactions": records}
+        scene = load_scene("ring18-cable").with_values(values)
+        campaign.attrs["scene"] = scene.to_toml()
+        lines = row(rows_of(campaign), "Loads")["result"].splitlines()
+        assert f"Missing: peak_base_force ({force})" in lines
+        assert f"Missing: base_rotation_max ({rotation})" in lines
+        assert ("held base or spacecraft" in holds(scene)) == ("[spacecraft]" not in force)
 
 
 @pytest.mark.quick
