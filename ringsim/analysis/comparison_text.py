@@ -247,7 +247,10 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> Table:
             each = zip(shares, of, strict=True)
             cells = [f"{round(share * n)} of {n} ({number_text(share, 3)})" for share, n in each]
         else:
-            cells = [f"{count} of {n}" for count, n in zip(counts, of, strict=True)]
+            # None of them may be compared: of those that have run on one side alone, for example.
+            cells = [
+                f"{count} of {n}" if n else str(count) for count, n in zip(counts, of, strict=True)
+            ]
         low, high = one[f"{word}_share_difference_interval"].tolist()
         apart = estimate_text(one[f"{word}_share_difference"].item(), low, high, 3)
         verdicts = one.get(f"{word}_verdict_text", np.empty(0)).tolist()

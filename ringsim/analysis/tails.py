@@ -99,8 +99,8 @@ def replicated_interval(each: Array, chains: Array, most: float = 1.0) -> tuple[
         variation = float(each.std(ddof=1) / middle / count**0.5)
         half = max(half, student(count) * float(logs.std(ddof=1)) / count**0.5)
     ends = np.exp(logs.mean() + square / 2 + np.array([-half, half]))
-    # Their mean may be outside still.
-    return np.array([min(ends[0], middle), max(ends[1], middle)]), variation
+    # Their mean may be outside still, and two replicates that agree little reach beyond all.
+    return np.array([min(ends[0], middle), min(max(ends[1], middle), 1.0)]), variation
 
 
 def tail(campaign: xr.Dataset) -> dict[str, Any]:

@@ -261,9 +261,6 @@ class _Course:
                 points[0] = 0.0
         stages = given.budget.stages
         name, title = f"stage-{number + 1}", f"stage {number + 1} of {stages}"
-        if not number:
-            # What an earlier call has found is not what this one finds.
-            (self.folder / (SENSORS if self.planning else POSTERIOR)).unlink(missing_ok=True)
         scene = given.campaign.scene.with_values({"record.interval": _interval(given)})
         try:
             points = self._accepted(points, unknowns, scene)
@@ -279,6 +276,9 @@ class _Course:
             if str(self.folder) in str(error):
                 cure = f"choose another folder with --out, or delete {name} and later stages"
             raise InputError(f"{given.campaign.file.name}: {title}: {error}: {cure}") from None
+        if not number:
+            # What an earlier call has found is not what this one finds.
+            (self.folder / (SENSORS if self.planning else POSTERIOR)).unlink(missing_ok=True)
         last = number + 1 == stages
         return Order(campaign, self.folder / name, more=not last, brief=True)
 

@@ -7,6 +7,7 @@ import json
 import shlex
 import tempfile
 import time
+import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -419,7 +420,14 @@ def _next(campaign: Folder, left: int, growth: str) -> str:
             return "wait: no sample has ended yet"
         return f"wait; ringsim merge {folder} gives the results so far"
     if left or len(campaign.unchecked()) or (growth and not (campaign.path / MERGED).exists()):
-        return f"ringsim campaign FILE --out {folder} continues it"
+        again = f"ringsim campaign FILE --out {folder}"
+        most = tomllib.loads(str(campaign.attributes["campaign"])).get("max_failed", np.inf)
+        if (failed := len(campaign.survey().failed)) > most:
+            return (
+                f"{counted(failed, 'sample')} failed, more than max_failed = {most}: raise it, or "
+                f"run these again: {again} --retry-failed"
+            )
+        return f"{again} continues it"
     verb = "merge" if is_behind(campaign.path) else "analyse"
     return f"ringsim {verb} {folder}"
 

@@ -162,6 +162,8 @@ def replay_command(
 
     campaign = open_folder(folder)
     if save is not None:
+        if scene:
+            raise InputError(f"--save {save}: nothing runs with --scene: leave out one of the two")
         require_file(save)
     if not 0 <= sample < campaign.table.samples:
         raise InputError(

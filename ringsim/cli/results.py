@@ -291,6 +291,8 @@ def plot_command(
     with opened(file) as dataset:
         others = {"tried_objective", "mechanism_modes"} & set(dataset)
         if others or {"learnt", "posterior_quantile"} <= set(dataset):
+            if animate:
+                raise InputError(f"--animate: {file} has no run to animate: leave it out")
             draw_result(dataset, out or file.parent, file.stem, formats)
             return
         file = file / MERGED if file.is_dir() else file
@@ -302,7 +304,13 @@ def plot_command(
                 "ringsim campaign has written (campaign.nc)"
             )
         folder = out or file.parent
+        if sample is not None and campaign:
+            _require_sample(dataset, sample, file)
         if measured is not None:
+            if animate:
+                raise InputError(
+                    "--animate: not together with --measured: leave out one of the two"
+                )
             _draw_measured(dataset, measured, folder, file.stem, formats)
             return
         drawn = draw_figures(dataset, folder, file.stem, formats)

@@ -116,6 +116,8 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
 
     Bad input ends with exit code 2 and one line that names the field, its value and the cure.
     """
+    if margin and time is not None:
+        raise InputError("--margin: not together with --deploys-in: leave out one of the two")
     loaded = load_scene(scene).with_values(settings)
     if time is not None:
         from ringsim.stowed_angle import opening_angle_for

@@ -192,9 +192,7 @@ def unresolved(run: Run, shocks: Mapping[str, float]) -> str:
 
 _AIM = 0.03
 """Uncertain share of a latch's rate that the cure of one beyond ``SURE`` aims at: it
-goes with the tolerance, and so with the square of steps.  On frames of 6 scenes with rods of 17 ms,
-at the default tolerance, a third and a tenth of it, 25 of 27 rates that were off by more than 5 %
-were told, and 55 of the 513 others (benchmarks/latch_rates.py)."""
+goes with the tolerance, and so with the square of steps."""
 _LEAST_FACTOR = 0.15
 """How much shorter steps shall be at most at once: fifty times the tolerance."""
 _JERKED = 0.15

@@ -129,7 +129,8 @@ class Run:
     @cached_property
     def history(self) -> History:
         """What became of the latches."""
-        return history(self.scene, self.angles.times, self.angles.values, self.rates.values)
+        times, angles, rates = self.angles.times, self.angles.values, self.rates.values
+        return history(self.scene, times, angles, rates, self.slowest_period)
 
     @cached_property
     def held(self) -> Array:

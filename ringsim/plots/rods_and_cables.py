@@ -369,7 +369,7 @@ def pulleys(dataset: xr.Dataset) -> Figure:
         axes.set_ylabel("Tension behind\nover before")
     # Above 1 where rope runs away from the winch.
     low, high = (float(known.min()), max(1.0, float(known.max()))) if known.size else (0.0, 1.0)
-    air = 0.1 * (high - low)
+    air = 0.1 * (high - low) or 0.05  # of a run that was over before anything moved
     grid[0, 0].set_ylim(low - air, high + air)
     lines = grid[0, 0].get_legend_handles_labels()[0]
     # Spans that a plane does not have are missing all the time.

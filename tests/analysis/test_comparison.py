@@ -282,6 +282,11 @@ def test_outcomes_that_changed_are_told_by_sample():
     assert found.asynchrony_max_samples.values.tolist() == [29, 29]
     counts = dict(zip(found.kind.values, found.kind_samples.values.tolist(), strict=True))
     assert counts == {"deployed": [30, 28], "failed: timeout": [0, 1], "stalled": [0, 1]}
+    # Where no pair holds on both sides each has its count, of none that are compared.
+    status[:], outcome = Status.TIMEOUT, np.full(30, Fate.NONE)
+    gone = seeded(np.full(30, np.nan), outcome=outcome, status=status)
+    told = compared(compare(gone, seeded(values, outcome=one)))
+    assert any(re.fullmatch(r"deployed +0 +30 +- +-", line) for line in told)
 
 
 @pytest.mark.parametrize(

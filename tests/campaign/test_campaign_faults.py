@@ -95,6 +95,10 @@ def test_too_many_failures_stop_the_campaign(bench):
     )
     assert "3 samples failed, more than max_failed = 2; 17 samples left" in printed
     assert "raise max_failed" in printed
+    told = (
+        "3 samples failed, more than max_failed = 2: raise it, or run these again: ringsim campaign"
+    )
+    assert told in bench.run("status", "out")
     file.write_text(file.read_text().replace("max_failed = 2", "max_failed = 5"))
     bench.run("campaign", file, "--workers", 1, "--out", "out", solver="fake_solver:poisoned")
     assert (bench.result("out").status.values == Status.ERROR).sum() == 5

@@ -251,6 +251,8 @@ def test_dry_run_says_what_there_is_a_value_for(bench):
 
 def test_replay_gives_the_stored_result_and_saves_it(bench):
     bench.run("campaign", bench.write(4), "--workers", 2, "--out", "out")
+    refused = bench.run("replay", "out", 2, "--scene", "--save", "two.nc", code=2)
+    assert "nothing runs with --scene: leave out one of the two" in refused
     printed = bench.run("replay", "out", 2, "--save", "two.nc")
     assert "identical to the stored result" in printed
     with xr.open_dataset(bench.folder / "two.nc") as saved:

@@ -354,6 +354,17 @@ def test_runs_that_fail_are_counted_and_shift_nothing(which, test_files, tmp_pat
         assert int((stage["status"] != 0).sum()) == lost[0]
 
 
+def test_what_is_refused_leaves_what_was_found(test_files, found, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(found[1], out)
+    refused = CliRunner().invoke(cli, [
+        "calibrate", str(test_files), "--out", str(out), "--set", "solver.tolerance=2e-3",
+    ])  # fmt: skip
+    assert refused.exit_code == 2
+    assert "this folder has another campaign" in refused.output
+    assert equal(out / POSTERIOR, found[1] / POSTERIOR)
+
+
 def test_too_many_failed_runs_end_it_in_one_line(test_files, tmp_path, monkeypatch):
     monkeypatch.setattr(simulation, "run_frame", lambda *_: 1 / 0)
     with pytest.raises(InputError, match="stage-1: 0 of 16 runs ended well, and 3 unknowns take 8"):

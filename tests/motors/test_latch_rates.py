@@ -15,7 +15,7 @@ from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 from ringsim.stepping.instant import Array
-from ringsim.stepping.locks import History, Latches, Meeting, may_decide, meetings
+from ringsim.stepping.locks import History, Latches, Meeting, history, may_decide, meetings
 
 
 def meeting(times: list[float], angles: list[float], rates: list[float]) -> Meeting:
@@ -78,6 +78,36 @@ def test_a_rate_below_what_the_joint_does_next_is_uncertain() -> None:
     slow = meeting([0.0, 1.0, 2.0, 3.0], [-0.2, -0.1, -1e-300, 1e-4], [0.1, 0.1, 0.1, 0.01])
     assert slow.rate == pytest.approx(0.1)
     assert slow.unsure < 0.01
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("part", [0.05, 0.1, 0.15, 0.2])
+def test_a_rate_that_rings_is_as_uncertain_as_steps_put_its_phase_wrong(part: float) -> None:
+    """A joint swings from the lock of another on, which comes a period before: the trapezoidal rule
+    swings at tan^-1(w h / 2) 2 / h instead of w, and its rate errs by that phase at most.
+    """
+    scene, period, size, speed = load_scene("truss2"), 0.2, 0.05, 0.4
+    step, omega = part * period, 2.0 * math.pi / period
+    numeric = 2.0 / step * math.atan(0.5 * omega * step)
+    worst = size * (omega - numeric) * period / speed
+    shape = len(scene.structure.planes), scene.structure.sections
+    for lock in (0.0, -math.inf):  # the other locks, or is long past its stop
+        times = step * np.arange(-3.5, period / step + 2.0)
+        angles, rates = np.full((len(times), *shape), math.pi - 1.0), np.zeros((len(times), *shape))
+        angles[:, 0, 0] = math.pi + np.where(lock < times, 1e-3, -1e-3)
+        since = np.maximum(times, 0.0)
+        way = speed * times + size / numeric * (1.0 - np.cos(numeric * since))
+        end = speed * period + size / numeric * (1.0 - math.cos(numeric * period))
+        angles[:, 0, 1] = math.pi + way - end
+        rates[:, 0, 1] = speed + size * np.sin(numeric * since)
+        share = history(scene, times, angles, rates, period).unsure[0, 1]
+        carried = history(scene, times, angles, rates, 1e6 * period).unsure[0, 1]
+        assert share >= carried
+        if lock == 0.0:
+            assert share == carried or 0.5 < share / worst < 1.5
+            assert share > 0.4 * worst
+        else:
+            assert share == carried
 
 
 @pytest.mark.quick

@@ -115,6 +115,9 @@ def test_no_interval_unless_every_replicate_came_to_the_event():
     ends, variation = replicated_interval(np.array([1e-3]), np.array([0.5]))
     assert ends[0] < 1e-3 < ends[1]
     assert np.isnan(variation)
+    # Student's t of two replicates is wide: no probability is above 1.
+    ends, _ = replicated_interval(np.array([0.01, 0.09]), np.array([1.0, 1.0]))
+    assert 0.0 < ends[0] < 0.05 < ends[1] == 1.0
 
 
 def test_the_nearest_value_that_all_replicates_reached_bounds_an_event_that_none_did():

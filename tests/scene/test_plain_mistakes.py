@@ -298,6 +298,10 @@ def test_places_without_a_campaign_are_told_apart(tmp_path: Path) -> None:
     [
         (("run", "truss2", "--accuracy", "1%"), "'1%' is not a valid number"),
         (("campaign", "a.toml", "--workers", "many"), "'many' is not a valid whole number"),
+        (
+            ("check", "truss2", "--margin", "--deploys-in", "9"),
+            "--margin: not together with --deploys-in: leave out one of the two",
+        ),
         (("check", "truss2", "--deploys-in", "-3"), "'--deploys-in': -3.0 is not in the range x>0"),
     ],
 )
