@@ -131,6 +131,10 @@ def _table(block: xr.Dataset, dims: tuple[str, ...]) -> Any:
         return told.expand_dims("row").to_dataframe().rename(columns=_headers(block))
     numbers = [n for n, v in told.data_vars.items() if v.dtype.kind == "f"]
     table = told.to_dataframe(dim_order=list(dims))
+    # Counts are read as real numbers, since some may be missing.
+    kinds = {n: np.dtype(block[n].encoding.get("dtype", float)).kind for n in numbers}
+    whole = [n for n in numbers if kinds[n] in "iu"]
+    table[whole] = table[whole].astype("Int64")
     if "time" in dims and len(numbers) == len(told.data_vars):
         table = table.dropna(how="all", subset=numbers)
     return table.reset_index().rename(columns=_headers(block))

@@ -419,7 +419,8 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
     both = "in both runs" if found.attrs["runs"] else "in all samples of both"
     notes += [f"{both} {', '.join(again)}"] * bool(again)
     named = ", ".join(flat.values())
-    notes += [f"differences and scatter below {100 * _ALIKE:g} %: {named}"] * bool(flat)
+    what = "differences" if found.attrs["runs"] else "differences and scatter"
+    notes += [f"{what} below {100 * _ALIKE:g} %: {named}"] * bool(flat)
     for name, side in zip(names_of(found), ("first", "second"), strict=True):
         only = found.attrs[f"only_{side}"]
         notes += [f"in {name} alone: {only}"] * bool(only)

@@ -351,6 +351,13 @@ def weights_of(
                 f"distribution to {new.follows}"
             )
         values, old = known[path].to_numpy(), _drawn_from(campaign, path, known[path])
+        for key in ("each_section", "shared", "unit"):  # where values go is as it was drawn
+            if getattr(new, key) and getattr(new, key) != getattr(old, key):
+                raise InputError(
+                    f"--reweight {path}: {key} = {show(getattr(new, key))}: the samples were drawn "
+                    "without it, and a new distribution changes no more than what they are worth: "
+                    "leave it out"
+                )
         _check_cover(path, old, new, len(values))
         logarithm += log_ratio(old, new, values)
         pairs[path] = Pair(old, new, values[:1].size)

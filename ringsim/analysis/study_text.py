@@ -432,7 +432,7 @@ def statistics_table(analysis: xr.Dataset, *, every: bool = False) -> Table:
     if unsaid := [row[0] for row in rows if row[-2] == "-"]:
         known = derived.known_from(analysis.attrs).items()
         own = [name for name, each in known if name in unsaid and each.worse is None]
-        told = "worst sample '-': large values of the output are no worse than small ones"
+        told = "worst sample '-': nothing says that one end of the output is worse than the other"
         cure = f'; of {", ".join(own)}, worse = "larger" or "smaller" under [outputs] says it'
         notes.append(f"{told}{cure * bool(own)}")
     notes += filter(None, [analysis.attrs.get(RECORDED)])

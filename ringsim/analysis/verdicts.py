@@ -339,9 +339,8 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         error = with_unit(number_text(one["numerical_error"], 2), quantities()[name].units)
         told.append(
             f"{name}: in {counted(close, 'sample')} it is closer to the limit than its numerical "
-            f"error (the sample's own error bar, or without one at most {error}, the root mean "
-            "square of those that ended alike, of all if that is more and fewer than three have "
-            "one): smaller steps, or more elements, settle it"
+            "error (the sample's own error bar, or without one the root mean square of those of "
+            f"the others, at most {error}): smaller steps, or more elements, settle it"
         )
     if unsure:
         which = f"whether {'all' if name == OUTCOME else 'so many'} latches catch"
@@ -504,7 +503,7 @@ def in_short(analysis: xr.Dataset, parts: Parts) -> list[str]:
     for table in parts.errors:
         for output, *_, source in table.rows if "dominates" in table.head else ():
             if output.partition(" ")[0] in chosen and source != "-":
-                sources.setdefault(source, []).append(output)
+                sources.setdefault(source.partition(" (")[0], []).append(output)
     each = [f"{source} in {', '.join(outputs)}" for source, outputs in sources.items()]
     return told + [f"largest error of a mean: {'; '.join(each)}"] * bool(each)
 

@@ -397,8 +397,10 @@ def status_lines(campaign: Folder) -> list[str]:
     if workers and ended.any():
         if ended[0]:
             checking = min(workers, sum(number < 0 for number, _ in unfinished))
-            rate = (workers - checking) * ended[0] / max(spent[0], 1e-9)
+            free = workers - checking or workers
+            rate = free * ended[0] / max(spent[0], 1e-9)
             busy = f"{counted(checking, 'worker')} busy with checks" if checking else ""
+            busy = "between checks" if checking == workers else busy
             beside = busy or "without checks" * bool(ended[1])
             beside = f" ({beside})" * bool(beside)
             lines.append(f"  rate           {rate:.3g} samples/s so far{beside}")

@@ -313,13 +313,14 @@ def plot_command(
                 )
             _draw_measured(dataset, measured, folder, file.stem, formats)
             return
+        shown = _shown(dataset, sample, file) if animate else None
         drawn = draw_figures(dataset, folder, file.stem, formats)
         if why := left_out(dataset):
             click.echo(why)
         if not drawn:
             click.echo(f"{file}: nothing to draw: no run reached its first recorded time")
-        elif animate:
-            run, name = _shown(dataset, sample, file)
+        elif shown is not None:
+            run, name = shown
             write_animation(run.load(), folder / f"{name}.gif", colour)
 
 
@@ -473,6 +474,7 @@ def export_command(
             )
         if samples and not campaign:
             raise InputError(f"--sample {samples[0]}: {file} has only one run: leave it out")
+        samples = tuple(dict.fromkeys(samples))  # each once, however often it is named
         for sample in samples:
             _require_sample(dataset, sample, file)
         if campaign and "pvd" in formats and not samples:

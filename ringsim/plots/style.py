@@ -567,7 +567,7 @@ _LETTER, _APART = 6.2, 6.0
 """Width of a letter of a tick's label, and the least between two labels, in points."""
 
 
-def few_ticks(axes: Axes, most: int = 5) -> None:
+def few_ticks(axes: Axes, most: int = 5, *, whole: bool = False) -> None:
     """Ticks along x, fewer where their labels are long: these do not run into each other.
 
     Called when the axis has its name: stress gets the labels of ``in_readable_units``.
@@ -578,7 +578,7 @@ def few_ticks(axes: Axes, most: int = 5) -> None:
     if _PASCAL in axis.get_label_text():
         told = FuncFormatter(partial(_scaled, readable("Pa", max(abs(low), abs(high)))[0]))
     for count in range(most, 1, -1):
-        axis.set_major_locator(MaxNLocator(count))
+        axis.set_major_locator(MaxNLocator(count, integer=whole, min_n_ticks=1 if whole else 2))
         places = axis.get_majorticklocs()
         words = told.format_ticks(places.tolist())
         longest = max(map(len, words), default=0)

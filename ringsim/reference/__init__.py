@@ -9,8 +9,11 @@ import re
 
 WORDS = {
     "by chance up to": "see chance",
+    "both error bars": "root sum of squares of those of the two engines, in the sample with the "
+    "largest difference",
     "chance": "what the largest of all inputs reaches in one output of 20 if none has any "
     "influence; the short tables list what is beyond it",
+    "attempts": "how often a sample was run, as one that failed is with --retry-failed",
     "better by": "by how much the objective of the first design is better than that of another "
     "one, an interval of 95 %",
     "check": "a run of a sample by the other engine, too, beside which it is laid",
@@ -68,6 +71,7 @@ WORDS = {
     "is none: of all, or of those that ended alike",
     "met": "the samples show, at the confidence asked for, that the probability is as required",
     "not met": "the samples show, at the confidence asked for, that it is not",
+    "log": "what the solver printed in a run that failed",
     "lock order": "figure of which V-joint locks first, second, ... and last, in how many samples",
     "may be off": "samples in which the number is uncertain: steps at a lock were too long or "
     "pulley friction was smoothed away (?), or the limit is closer than the numerical error",
@@ -86,6 +90,7 @@ WORDS = {
     "more samples are needed",
     "one-sided bound": "the bound of the probability that decides a verdict: the least of it for "
     "met, the most for not met, at the confidence asked for (Clopper and Pearson)",
+    "overrides": "settings with which --retry-failed --set ran a sample again",
     "overloaded": "outcome of a run in which a limit of the scene was passed: a V-joint past its "
     "stop, a rope's strain or tension, a rod's stress",
     "partial": "see partial rank correlation",
@@ -104,6 +109,7 @@ WORDS = {
     "one grows or falls with the other, however bent",
     "rank correlation of pairs": "correlation of the ranks of an output in both samples of each "
     "pair: near 1 samples that are bad on one side are so on the other",
+    "reason": "why a run ended, in words, and what it says of its numbers",
     "remaining scatter": "the posterior's standard deviation over the prior's, of the normal "
     "variable behind the law: 1 where the data tell nothing",
     "rms / sigma": "root mean square of measured less computed over the standard deviation of a "
@@ -116,6 +122,7 @@ WORDS = {
     "samples used": "samples whose run holds; in statistics of an output those that have a value "
     "of it, in verdicts also those without, which violate",
     "samples with bars": "samples that have an error bar of the output",
+    "sample_seed": "seed of a sample, by which samples of two campaigns are paired",
     "sampling": "part of the error of a mean: by the draw of the samples, as a standard error",
     "separation": "of all pairs of a sample in the group and one outside, the share in which the "
     "one in the group has the larger (or smaller) input; 50 % tells nothing",

@@ -289,6 +289,8 @@ def test_words_and_lists_of_places_have_weights():
         ({"x1": {"kind": "normal", "mean": 0.5}}, "standard_deviation is missing"),
         ({"tail": {"kind": "normal", "mean": 3.2, "standard_deviation": 0.5}}, "hardly any of"),
         ({"word": {"kind": "discrete", "values": ["a", "c"]}}, '"c" was never drawn'),
+        ({"x1": NARROW | {"each_section": True}}, "each_section = true: the samples were drawn"),
+        ({"x1": NARROW | {"unit": "m"}}, 'unit = "m": the samples were drawn without it'),
         ({"listed": NARROW}, "has no distribution"),
         ({"pair": NARROW}, "correlated with x1"),
         ({"learnt": NARROW}, "was learnt from a test"),

@@ -316,7 +316,7 @@ def test_the_rate_of_samples_is_of_the_workers_that_run_them(copied):
     assert rate() == "1 samples/s so far (1 worker busy with checks)"
     told["running"] = {check_of(k): 5.0 for k in range(3)}
     (out / "progress-all.json").write_text(json.dumps(told))
-    assert rate() == "0 samples/s so far (3 workers busy with checks)"
+    assert rate() == "1.5 samples/s so far (between checks)"
     told |= {"running": {0: 1.0, 1: 1.0, 2: 1.0}, "ended": [12, 1]}
     (out / "progress-all.json").write_text(json.dumps(told))
     assert rate() == "1.5 samples/s so far (without checks)"

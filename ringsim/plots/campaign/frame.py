@@ -126,7 +126,8 @@ def mark_panels(figure: Figure, names: Collection[str]) -> bool:
         if cut or any(w in told for w in words) or told.split(" ")[0] in names:
             found.append(text)
     for text in found:
-        text.set_text(f"{text.get_text()}{DOUBT}")
+        own, count, more = text.get_text().partition("\nn = ")  # behind the name, not the count
+        text.set_text(f"{own}{DOUBT}{count}{more}")
     return bool(found)
 
 

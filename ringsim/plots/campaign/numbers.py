@@ -26,6 +26,7 @@ from ringsim.analysis.design import (
 from ringsim.analysis.indices import centred_ranks
 from ringsim.analysis.intervals import good, numbers, quantile, ran, tells_of
 from ringsim.analysis.requirements import (
+    COUNTS,
     OUTCOME,
     Requirement,
     badness_of,
@@ -119,7 +120,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         style.plain_numbers(axes.xaxis)
         axes.set_xlabel(style.label(campaign[name], width=38))
-        style.few_ticks(axes)
+        style.few_ticks(axes, whole=name in COUNTS)
         titles.append(words)
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
