@@ -221,9 +221,12 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
     }
 
 
-def _counts(values: np.ndarray[Any, Any]) -> bool:
-    """Whether all are whole or missing: the mean of a count, as of an analysis, is none."""
-    return bool((np.isnan(values) | (values == np.rint(values))).all())
+def _counts(values: np.ndarray[Any, Any], dtype: str) -> bool:
+    """Whether all are missing, or numbers that a count's type holds: a mean of counts, as in an
+    analysis, is no count.
+    """
+    inside = (values >= 0.0) & (values <= np.iinfo(dtype).max) & (values == np.rint(values))
+    return bool((np.isnan(values) | inside).all())
 
 
 def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
@@ -233,8 +236,9 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
         declared = VARIABLES.get(str(name))
         if variable.dtype.kind == "f" and name not in dataset.coords:
             chosen["_FillValue"] = np.nan
-            if declared is not None and declared.dtype.startswith("i") and _counts(variable.values):
-                chosen = {"dtype": declared.dtype, "_FillValue": -1}
+            dtype = "f8" if declared is None else declared.dtype
+            if dtype.startswith("i") and _counts(variable.values, dtype):
+                chosen = {"dtype": dtype, "_FillValue": -1}
         if variable.ndim > 0 and variable.dtype.kind in "fiub":
             chosen |= {"zlib": True, "complevel": 4, "shuffle": True}
         encoding[str(name)] = chosen

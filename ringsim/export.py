@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ringsim.files import whole
 from ringsim.layout.bodies import Array
+from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
 from ringsim.shapes import ByLine, Shape, shape_of
@@ -124,6 +125,13 @@ def _blocks(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[xr.Dataset]:
         yield dataset.isel({dims[0]: slice(start, start + step)})
 
 
+def _counts(name: str, values: Array) -> bool:
+    """Whether a variable, or that of a check, is a count, and holds nothing else."""
+    declared = VARIABLES.get(name.removesuffix("_checked"))
+    known = values[~np.isnan(values)]
+    return bool(declared and declared.dtype.startswith("i") and (known == np.rint(known)).all())
+
+
 def _table(block: xr.Dataset, dims: tuple[str, ...]) -> Any:
     """A pandas table of a block, with units in its headers."""
     told = block.map(in_words, keep_attrs=True)
@@ -132,9 +140,8 @@ def _table(block: xr.Dataset, dims: tuple[str, ...]) -> Any:
     numbers = [n for n, v in told.data_vars.items() if v.dtype.kind == "f"]
     table = told.to_dataframe(dim_order=list(dims))
     # Counts are read as real numbers, since some may be missing.
-    kinds = {n: np.dtype(block[n].encoding.get("dtype", float)).kind for n in numbers}
-    whole = [n for n in numbers if kinds[n] in "iu"]
-    table[whole] = table[whole].astype("Int64")
+    counts = [n for n in numbers if _counts(str(n), table[n].to_numpy())]
+    table[counts] = table[counts].astype("Int64")
     if "time" in dims and len(numbers) == len(told.data_vars):
         table = table.dropna(how="all", subset=numbers)
     return table.reset_index().rename(columns=_headers(block))

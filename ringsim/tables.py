@@ -107,12 +107,14 @@ def number_text(value: float, digits: int = 4) -> str:
 
 
 def thousandths(margin: float) -> str:
-    """Three decimals of a margin, but never a 0 that is none: its sign is the verdict.
+    """Three decimals of a margin, but never a 0 that is none: its sign is the verdict; or a dash.
 
-    >>> thousandths(-0.8691), thousandths(-0.00002), thousandths(0.0)
-    ('-0.869', '-2.0e-05', '0.000')
+    >>> thousandths(-0.8691), thousandths(-0.00002), thousandths(-0.0), thousandths(math.nan)
+    ('-0.869', '-2.0e-05', '0.000', '-')
     """
-    return f"{margin:.1e}" if 0.0 < abs(margin) < 0.0005 else f"{margin:.3f}"
+    if not math.isfinite(margin):
+        return "-"
+    return f"{margin:.1e}" if 0.0 < abs(margin) < 0.0005 else f"{margin + 0.0:.3f}"
 
 
 def without_power(text: str, value: float) -> str:

@@ -134,7 +134,9 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
     """Main outputs by which the samples of one are in another order than those of the other, of
     those that vary.
     """
-    if "inputs differ" in found.attrs["pairing"]:  # pairs of antennas that have nothing in common
+    # Draws at the same place of the unit cube rank alike whatever their distributions; with other
+    # places an input has nothing in common.
+    if " places)" in found.attrs["pairing"]:
         return
     turned, tend, apart = dict[str, float](), dict[str, float](), dict[str, float]()
     still = list[str]()
@@ -288,25 +290,30 @@ def _limits(found: xr.Dataset) -> Table:
 
 def _numerical(found: xr.Dataset, names: Sequence[str]) -> list[str]:
     """Which differences numerical errors may have made, as far as error bars tell."""
-    within = list[str]()
+    within, wider = list[str](), list[str]()
     every = [found[str(name)] for name in found.data_vars if str(name).endswith("_numerical_error")]
     known = any(bool(np.isfinite(each).any()) for each in every)
     for name in names:
         errors = found[f"{name}_numerical_error"].values
         size = float(np.sqrt(np.nansum(errors**2)))
+        factor, unit = readable(quantities()[name].units, size)
+        sides = zip(names_of(found), np.isfinite(errors), strict=True)
+        of = [f", of {side} alone" for side, has in sides if has]
+        words = with_unit(number_text(factor * size, 2), unit) + "".join(of[: len(of) == 1])
+        interval = found.get(f"{name}_difference_interval", np.array(np.nan))
         if _within(found, name):
-            factor, unit = readable(quantities()[name].units, size)
-            sides = zip(names_of(found), np.isfinite(errors), strict=True)
-            of = [f", of {side} alone" for side, has in sides if has]
-            words = with_unit(number_text(factor * size, 2), unit) + of[0] * (len(of) == 1)
             within.append(f"{name} ({words})")
+        elif size > 0.5 * float(np.ptp(np.asarray(interval))):
+            wider.append(f"{name} ({words})")
     if not names:
         return []
     if not known:
         return [f"numerical errors are not measured in either ({_cure(found)}), and not counted"]
     told = "differences within the numerical errors (root sum of squares of the error bars of both)"
     alone = "intervals are of sampling alone; " * (not found.attrs["runs"])
+    more = "differences that numerical errors leave more uncertain than sampling"
     return [f"{told}: {', '.join(within)}"] * bool(within) + [
+        *[f"{more}: {', '.join(wider)}"] * bool(wider),
         f"{alone}a numerical error that both runs have alike is not in their difference",
         *_without_bars(found, every),
     ]

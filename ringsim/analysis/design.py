@@ -298,8 +298,8 @@ def worst_is_largest(analysis: xr.Dataset, name: str) -> bool:
     """Whether the worst sample of an output, by itself or by what is required of it, is the one
     with the largest value.
     """
-    worst = int(analysis[f"{name}_worst_sample"])
-    return worst >= 0 and worst == int(analysis[f"{name}_end_sample"][1])
+    worst, ends = int(analysis[f"{name}_worst_sample"]), analysis[f"{name}_end_sample"].values
+    return bool(worst >= 0 and worst == ends[1] != ends[0])
 
 
 def median_and_worst(campaign: xr.Dataset) -> tuple[int, int] | None:

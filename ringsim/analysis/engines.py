@@ -230,8 +230,10 @@ def run_lines(frame: Outcome, full: Outcome) -> list[str]:
         one, other = (float(each.values[name]) for each in (frame, full))
         apart, share = (float(x) for x in _apart(np.array(one), np.array(other)))
         stated = [each.values.get(f"{name}_error", np.array(np.nan)) for each in (frame, full)]
+        if share <= ROUND_OFF or apart <= NOTHING:
+            apart = share = 0.0
         numbers = f"{one:.6g}", f"{other:.6g}", f"{apart:.2g}", f"{share:.2g}"
-        rows.append((name, variable.units, *numbers, _or_dash(float(sum(stated)))))
+        rows.append((name, unit_text(variable.units), *numbers, _or_dash(float(sum(stated)))))
     head = ("output", "unit", "frame", "full", "difference", "share", "error bars")
     lines = text_table(head, rows) if rows else []
     if frame.fate != full.fate:

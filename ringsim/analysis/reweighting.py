@@ -352,11 +352,12 @@ def weights_of(
             )
         values, old = known[path].to_numpy(), _drawn_from(campaign, path, known[path])
         for key in ("each_section", "shared", "unit"):  # where values go is as it was drawn
-            if getattr(new, key) and getattr(new, key) != getattr(old, key):
+            mine, theirs = getattr(new, key), getattr(old, key)
+            if mine and mine != theirs:
+                drawn = f"with {show(theirs)}" if theirs else "without it"
                 raise InputError(
-                    f"--reweight {path}: {key} = {show(getattr(new, key))}: the samples were drawn "
-                    "without it, and a new distribution changes no more than what they are worth: "
-                    "leave it out"
+                    f"--reweight {path}: {key} = {show(mine)}: the samples were drawn {drawn}, and "
+                    "a new distribution changes no more than what they are worth: leave it out"
                 )
         _check_cover(path, old, new, len(values))
         logarithm += log_ratio(old, new, values)

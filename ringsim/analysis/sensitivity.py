@@ -560,9 +560,9 @@ def rarer_table(analysis: xr.Dataset) -> Table:
             best.setdefault(which[k][:2], k)
         kept = [k for k in best.values() if one["change_listed"].values[k]]
         kept.sort(key=lambda k: -abs(ratio[k] - 1.0))
-        missing = int(np.isnan(ratio).sum())
-        quiet += [name] * (not kept and not 0 < missing == len(ratio))
-        unequal += [f"{name} ({missing} of {len(ratio)} changes)"] * bool(missing)
+        missing = {which[k][:2] for k in np.flatnonzero(np.isnan(ratio))}
+        quiet += [name] * (not kept and not 0 < np.isnan(ratio).sum() == len(ratio))
+        unequal += [f"{name} ({len(missing)} of {len(best)} changes)"] * bool(missing)
         if len(kept) > _MOST_CHANGES:
             more.append(f"{name} {len(kept) - _MOST_CHANGES}")
         for n, k in enumerate(kept[:_MOST_CHANGES]):
@@ -580,8 +580,8 @@ def rarer_table(analysis: xr.Dataset) -> Table:
             "estimated from the same samples (weights, as with --reweight), one distribution at a "
             f"time: standard deviation, range or probability {100 * STEP:g} % smaller, or mean "
             f"moved by {100 * STEP:g} % of the standard deviation to the side with fewer "
-            "violations; the interval is that of the change, not of the probability as drawn; by "
-            f"chance alone, fewer than one requirement in 20 would be listed ({count} changes)"
+            "violations; the interval is that of the change, not of the probability as drawn; of "
+            f"{count} changes each, chance alone would list fewer than one requirement in 20"
         )
     notes += [f"further significant changes: {', '.join(more)}"] * bool(more)
     if quiet and which:

@@ -26,7 +26,7 @@ from ringsim.campaign.run import Order, grown, growth_told
 from ringsim.campaign.watch import End, decided, looks_of, named
 from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
-from ringsim.execution.work import Array, Work, relative_cost
+from ringsim.execution.work import FULL, Array, Work, relative_cost
 from ringsim.files import MERGED
 from ringsim.refusal import show
 from ringsim.sampling.columns import Column, Table
@@ -43,8 +43,6 @@ Samples = NDArray[np.int64]
 _MOST_SHOWN = 10
 _SHORT = 20.0
 """A trial run that takes longer hardly consists of loading code, s."""
-_FULL = 30.0
-"""Time of the full engine over that of frames: 20 to 50 (docs/evidence/frame.md)."""
 _UNUSUAL = 5.0
 """Time of a sample that runs over that of others from which on both are told."""
 _BARS = "solver.error_bars"
@@ -185,9 +183,9 @@ def _predicted(
         basis = f"from {counted(len(known), 'completed sample')}"
         written = (file.stat().st_size for file in (order.folder / "journals").iterdir())
         size = sum(written) / runs
-    elif like * _FULL > _SHORT:
-        per_cost, size = like * _FULL, 0.0
-        basis = f"estimated as {_FULL:g} times a sample's: a trial would take as long"
+    elif like * FULL > _SHORT:
+        per_cost, size = like * FULL, 0.0
+        basis = f"estimated as {FULL:g} times a sample's: a trial would take as long"
     else:
         trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
         kept: list[Result] = []
@@ -208,11 +206,15 @@ def _predicted(
         basis += _has_of(result, campaign.specification.requirements)
         if result.status != Status.OK:
             basis += "; runs that end well may take far longer than this one"
-    each = per_cost * cost[todo]
-    barred = np.zeros(len(todo), dtype=bool)
+    each, barred = per_cost * cost[todo], np.zeros(len(todo), dtype=bool)
     for column in table.columns:
         if column.path == _BARS and column.values.dtype.kind == "b":
             barred = column.values[todo]
+            for has in (False, True):  # what error bars cost is known once some have run
+                own = known[column.values[known] == has]
+                if len(own):
+                    time_of = float(found.seconds[own].sum() / cost[own].sum())
+                    each[barred == has] = time_of * cost[todo[barred == has]]
     ends = _span(each[~barred] if not barred.all() else each)
     basis = "with error bars, " * bool(barred.all()) + basis
     if barred.any() and not barred.all():
@@ -317,6 +319,8 @@ def extent_told(column: Column) -> str:
     each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
     if '"kind":"function"' in column.origin:
         each += f", follows {column.input}"
+    elif column.path and column.input not in ("", column.path):
+        return f"  {column.input}, {column.path}: {extent}{each}"
     return f"  {column.path or column.input or f'label {column.name}'}: {extent}{each}"
 
 
@@ -425,9 +429,9 @@ def _next(campaign: Folder, left: int, growth: str) -> str:
         again = f"ringsim campaign FILE --out {folder}"
         most = tomllib.loads(str(campaign.attributes["campaign"])).get("max_failed", np.inf)
         if (failed := len(campaign.survey().failed)) > most:
+            once = f", or run these again: {again} --retry-failed" * (not growth)
             return (
-                f"{counted(failed, 'sample')} failed, more than max_failed = {most}: raise it, or "
-                f"run these again: {again} --retry-failed"
+                f"{counted(failed, 'sample')} failed, more than max_failed = {most}: raise it{once}"
             )
         return f"{again} continues it"
     verb = "merge" if is_behind(campaign.path) else "analyse"
@@ -447,12 +451,12 @@ def time_left(campaign: Folder, workers: int, running: Mapping[int, float] | Non
     per_check = _per_cost(cost, campaign.survey(checks=True)) if len(checked) else np.nan
     guessed = len(checked) > 0 and np.isnan(per_check)
     from_check = np.isnan(per_sample) and not guessed and not np.isnan(per_check)
-    per_sample = per_check / _FULL if from_check else per_sample
+    per_sample = per_check / FULL if from_check else per_sample
     left = np.concatenate([found.missing, ~checked]).astype(np.int64)  # as ``check_of``
     if not len(left):
         return "none"
     is_check = left < 0
-    per = np.where(is_check, _FULL * per_sample if guessed else per_check, per_sample)
+    per = np.where(is_check, FULL * per_sample if guessed else per_check, per_sample)
     each = per * cost[np.where(is_check, ~left, left)]
     lasted = np.array([(running or {}).get(number, np.nan) for number in left.tolist()])
     # Of a check that takes longer than was guessed nobody knows how long.
@@ -475,7 +479,7 @@ def time_left(campaign: Folder, workers: int, running: Mapping[int, float] | Non
     if len(found.missing) and done.any() and cost[found.missing].mean() < 0.8 * cost[done].mean():
         told += " (costly samples come first)"  # as those with error bars: the rate so far is less
     if (guessed and (is_check & known).any()) or (from_check and not is_check.all()):
-        told += f", a check taken as {_FULL:g} times a sample"
+        told += f", a check taken as {FULL:g} times a sample"
     for kind, word in ((~is_check, "sample"), (is_check, "check")):
         if count := int((kind & ~known).sum()):
             told += f", plus {counted(count, word)} of unknown duration"

@@ -171,7 +171,9 @@ def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
 def _watched(
     campaign: Folder, choices: Choices, stop: StopRequest, work: Work
 ) -> tuple[list[int], Progress, Work]:
-    """The checks and samples to run, longest ones first, and the work with who watches it."""
+    """The samples to run, longest ones first, with checks among them, and the work with who watches
+    it.
+    """
     share, most = choices.share, choices.max_failed
     campaign = as_decided(campaign)
     before, every = campaign.survey(), np.arange(campaign.table.samples)
@@ -260,10 +262,9 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
         for line in lines:
             _tell(f"  {line}")
     if stop.reason and not stop.signalled and not stop.enough:
-        _tell(
-            f"{stop.reason}; {counted(left, 'sample')} left: raise max_failed, or run the failed "
-            "ones again with --retry-failed (and --set solver.tolerance=...)"
-        )
+        once = ", or run the failed ones again with --retry-failed (and --set solver.tolerance=...)"
+        once *= not growth_told(campaign)  # what grows depends on them
+        _tell(f"{stop.reason}; {counted(left, 'sample')} left: raise max_failed{once}")
         return EXIT_FAILED
     unchecked = len(campaign.unchecked())
     todo = counted(left, "sample") + f" and {counted(unchecked, 'check')}" * (unchecked > 0)

@@ -138,17 +138,24 @@ def longest_first(samples: NDArray[np.int64], cost: Array) -> list[int]:
     return [int(sample) for sample in samples[np.argsort(-cost[samples], kind="stable")]]
 
 
+FULL = 30.0
+"""Time of the full engine over that of frames: 20 to 50 (docs/evidence/frame.md)."""
+
+
 def with_checks(samples: Sequence[int], checks: Sequence[int], workers: int) -> list[int]:
-    """Samples in their order, and checks evenly among the first half of them.
+    """Samples in their order, and checks evenly among the first half of them, as far as a check
+    less than half of the samples takes.
 
     A check takes as long as dozens of samples: where all came first, nothing else would be known
     for minutes; where they came last, workers would wait for each other.
 
-    >>> with_checks([0, 1, 2, 3, 4, 5, 6, 7], [-1, -5], workers=1)
-    [0, -1, 1, 2, -5, 3, 4, 5, 6, 7]
+    >>> with_checks([0, 1, 2, 3], [-1, -3], workers=1)
+    [0, -1, -3, 1, 2, 3]
+    >>> with_checks(range(100), [-1, -51], workers=1).index(-51)
+    12
     """
     first = min(workers, len(samples))  # each worker begins with a sample
-    step = max(len(samples) / 2 - first, 0.0) / max(len(checks), 1)
+    step = max(len(samples) / 2 - first - FULL * workers, 0.0) / max(len(checks), 1)
     places = [*range(len(samples)), *(first - 0.5 + step * check for check in range(len(checks)))]
     order = np.argsort(places, kind="stable")
     return [[*samples, *checks][place] for place in order]

@@ -11,15 +11,18 @@ WORDS = {
     "by chance up to": "see chance",
     "both error bars": "root sum of squares of those of the two engines, in the sample with the "
     "largest difference",
+    "beyond all samples": "readings beyond those of all samples of a campaign, and their errors",
     "chance": "what the largest of all inputs reaches in one output of 20 if none has any "
     "influence; the short tables list what is beyond it",
     "attempts": "how often a sample was run, as one that failed is with --retry-failed",
     "better by": "by how much the objective of the first design is better than that of another "
     "one, an interval of 95 %",
+    "change": "by how much a probability would change, as a share of it",
     "check": "a run of a sample by the other engine, too, beside which it is laid",
     "cut off": "outcome of a run: still moving, or driven, at solver.end_time",
     "clock": "offset and drift of a test's time against the run's, found with the unknowns",
     "counted drive": "what drives at an angle, as the standard of the margin counts it",
+    "confidence": "how sure a verdict must be: in such a share of studies its bound holds",
     "correlation": "see rank correlation and partial rank correlation",
     "deployed": "outcome of a run: every V-joint has come to 180 deg, and all latches hold",
     "difference": "the second less the first, of means or of shares",
@@ -30,6 +33,7 @@ WORDS = {
     "it is least it is the variable least_drive_margin",
     "effect": "mu*, the mean absolute change of an output by a move of a group (Morris), in the "
     "output's unit",
+    "empty cells": "cells of a measured table without a reading",
     "engines": "part of the error of a mean: root mean square of the differences between the two "
     "engines, over the samples that were checked",
     "effective samples": "how many plain samples of the other distribution the weighted ones are "
@@ -42,6 +46,7 @@ WORDS = {
     "estimate": "the value by all samples, which its interval is of",
     "failed runs": "samples whose run failed, so that nothing is known of the antenna; lower "
     "bounds count them as violating",
+    "event": "what a rare-event study asks the probability of",
     "fan": "figure of how far each section is ahead of the mean opening angle or behind it, over "
     "time and samples",
     "first-order index": "share of an output's variance that an input, or a group, explains by "
@@ -52,16 +57,19 @@ WORDS = {
     "index": "see first-order index and total index",
     "interval": "where a statistic of all antennas lies with 95 % confidence, by the samples that "
     "were drawn; it says nothing of numerical errors",
+    "its error bar": "error bar of the value beside it, see error bar",
     "lag": "how far the opening angle of a joint is from the mean of all at that time; of a motor "
     "how long it is slower than commanded",
     "kind": "which of several forms a table has, such as a law of an input; explain of the table's "
     "key lists them",
     "largest bar": "the largest error bar of a sample, and which sample has it",
-    "largest difference": "the largest difference between the engines, and in which sample",
+    "largest difference": "the largest difference between the engines, and in which sample; of a "
+    "test between measured and computed",
     "largest difference of a pair": "the largest, by its size, of the differences of the second "
     "less the first in the same sample",
     "least": "the smallest value of all samples used",
     "learnt": "what is left of an unknown's scatter, see remaining scatter",
+    "left out": "samples, readings or parts of a scene that are not used",
     "limit": "a bound on an output, from requirements or from limits of the scene",
     "law": "the distribution of an input; explain inputs lists all kinds",
     "mean": "sum over the samples used by their number",
@@ -75,6 +83,7 @@ WORDS = {
     "lock order": "figure of which V-joint locks first, second, ... and last, in how many samples",
     "may be off": "samples in which the number is uncertain: steps at a lock were too long or "
     "pulley friction was smoothed away (?), or the limit is closer than the numerical error",
+    "mean difference": "mean of measured less computed over the readings of a sensor",
     "mechanism": "how many modes move a structure of rigid rods: nothing but inertia holds them",
     "modal mass": "the mass that a natural mode moves, its shape 1 where it is largest",
     "no population": "the samples were chosen, not drawn: there are no probabilities of antennas",
@@ -112,6 +121,8 @@ WORDS = {
     "reason": "why a run ended, in words, and what it says of its numbers",
     "remaining scatter": "the posterior's standard deviation over the prior's, of the normal "
     "variable behind the law: 1 where the data tell nothing",
+    "requirement": "a bound on an output, with the probability and the confidence that it asks for",
+    "rms difference": "root mean square of measured less computed over the readings of a sensor",
     "rms / sigma": "root mean square of measured less computed over the standard deviation of a "
     "reading: about 1 where the run explains the data",
     "samples beyond": "samples whose value is beyond the limit of the scene, each beyond its own "
@@ -122,8 +133,11 @@ WORDS = {
     "samples used": "samples whose run holds; in statistics of an output those that have a value "
     "of it, in verdicts also those without, which violate",
     "samples with bars": "samples that have an error bar of the output",
+    "sample": "one set of drawn values, and the run with them",
     "sample_seed": "seed of a sample, by which samples of two campaigns are paired",
     "sampling": "part of the error of a mean: by the draw of the samples, as a standard error",
+    "second-order index": "share of an output's variance that two inputs explain together, beyond "
+    "what each does by itself",
     "separation": "of all pairs of a sample in the group and one outside, the share in which the "
     "one in the group has the larger (or smaller) input; 50 % tells nothing",
     "set aside": "readings that do not fit, few enough to be left out: strays",
@@ -135,6 +149,7 @@ WORDS = {
     "speed asks for",
     "stalled": "outcome of a run: at rest with no V-joint locked, and nothing drives it",
     "standard error": "how far a mean is off by the draw of the samples, as a standard deviation",
+    "statistic": "a number of all samples: their mean, standard deviation, a quantile, or an end",
     "std. dev.": "standard deviation over the samples used (their number less 1)",
     "stray": "one of few readings that do not fit: it is set aside, and named",
     "tornado": "figure of what matters: the inputs of each output, the strongest on top",
@@ -142,7 +157,12 @@ WORDS = {
     "with others; what is near 0 may be left out",
     "violating": "samples that break the requirement, or have no value of its output",
     "unit": "that of the output, after the SI prefix that suits its values",
+    "verdict without failed runs": "the verdict if failed runs did not count as violations",
+    "unusual inputs": "inputs of a sample that few others have so large or so small, of those that "
+    "go with what it is worst in",
     "verdict": "met, not met or not yet shown: what the samples say of a requirement",
+    "what changes a probability": "how much rarer violations would be if an input scattered less, "
+    "or its mean moved",
     "what matters": "the inputs that an output goes with beyond chance, the strongest first",
     "what separates": "inputs by which the samples of a group differ from the others, see "
     "separation",
@@ -151,6 +171,7 @@ WORDS = {
     "worst value": "see worst sample",
     "worst of": "the samples in which a requirement or an outcome is missed by most, the worst "
     "first",
+    "within 90 %": "share of the readings in the band that holds 90 % of the samples",
     "worse in": "the side of a comparison that is worse in the output: where the 95 % interval of "
     "the difference leaves out zero; - where it does not, where less than 0.1 % or the numerical "
     "error is between the two, or where an output has no bad side",
@@ -178,6 +199,9 @@ def word(name: str) -> str:
         name = "quantile"
     bare = re.sub(r" ?[\d.]+ % ?", "", name.lower())
     for each in (bare, *(bare.partition(part)[0] for part in (" (", " of ", " in ", " for "))):
-        if near := difflib.get_close_matches(each.removesuffix(" of"), WORDS, n=1, cutoff=0.85):
+        own = each.removesuffix(" of").removesuffix(" there")
+        near = difflib.get_close_matches(own, WORDS, n=1, cutoff=0.85)
+        # Of short words others are near that mean something else: lock, clock.
+        if near and near[0][0] == own[0] and (len(own) > 6 or own in (near[0], f"{near[0]}s")):
             return f"{near[0]}: {WORDS[near[0]]}"
     return ""

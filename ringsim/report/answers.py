@@ -146,7 +146,7 @@ def evidence_of(of: Of, name: str) -> str:
     if OUTCOME in campaign and len(campaign[OUTCOME]) == used + lost + absent:
         valued = good(campaign) & np.isfinite(numbers(campaign, name))
         short = int((valued & ended_short(campaign)).sum())
-        words[0] += f", {short} of them as they ended, not deployed" * bool(short)
+        words[0] += f", {short} of them not deployed, as they ended" * bool(short)
     for most, count, told in (
         ("largest bar", "samples with bars", "error bar"),
         ("largest difference", "samples checked", "engine difference"),

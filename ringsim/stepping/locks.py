@@ -356,7 +356,7 @@ class Latches(Remembering):
 
 def history(scene: "Scene", times: Array, angles: Array, rates: Array, period: float) -> History:
     """What became of the latches of a scene in a run, with the slowest rod's ``period`` (s); see
-    ``meetings`` and ``_rung``.
+    ``meetings`` and ``ringing``.
     """
     latches, found = Latches(scene), History(*np.full((3, *angles.shape[1:]), np.nan))
     first = np.full(angles.shape[1:], np.nan)
@@ -369,7 +369,7 @@ def history(scene: "Scene", times: Array, angles: Array, rates: Array, period: f
             found.caught_at[one.place] = one.time
     for plane, section in np.argwhere(found.rates > 0.0).tolist():
         at = plane, section
-        own = _rung(times, rates[:, plane, section], first, float(first[at]), period)
+        own = ringing(times, rates[:, plane, section], first, float(first[at]), period)
         # It is no reason to take a rate for several times as large.
         found.unsure[at] = max(found.unsure[at], min(own / found.rates[at], UNKNOWN))
     return found
@@ -378,16 +378,20 @@ def history(scene: "Scene", times: Array, angles: Array, rates: Array, period: f
 _PERIODS = 2.0
 """Periods for which a joint rings with what an earlier lock has left."""
 _PHASE = 15.0
-"""Error of a vibration in a period, over itself and the square of steps in it: steps of second
+"""Error of a vibration over itself and the square of steps in its period: in one steps of second
 order lose (2 pi)^3 / 12 (h / T)^2 = 21 (h / T)^2 of its phase.  On frames of 12 scenes at their own
 tolerance, 0.3 and 0.1 of it, what is told of rates rises by it from 49 of the 78 that are off by
 more than 5 % to 70, and from 64 of the 870 others to 85; 21 tells 70 and 99.  Of 11 other scenes
 71 of 85 are told, 45 without it, and 80 of 677 others (benchmarks/latch_rates.py)."""
 
 
-def _rung(times: Array, rates: Array, locks: Array, lock: float, period: float) -> float:
-    """How far (rad/s) steps may put the rate off that a joint has at its lock (s), since they are
+def ringing(times: Array, rates: Array, locks: Array, lock: float, period: float) -> float:
+    """About how far (rad/s) steps put the rate off that a joint has at its lock (s), since they are
     too long for what earlier ``locks`` (s) have left of vibrations of the slowest rod's period.
+
+    Of a pure sine it is a third (half a period after the lock) to nine tenths of the largest error
+    (two periods after): the straight line that is taken off holds some of it, and ``_PHASE`` is
+    fitted to warn of what is off by more than ``SURE``, and no bound.
     """
     earliest = lock - _PERIODS * period
     before = locks[(locks >= earliest) & (locks < lock - 0.25 * period)]

@@ -116,6 +116,12 @@ def test_differences_within_the_numerical_errors_are_named():
     # What the bars of both may have made is worse in neither; beyond one bar alone it is.
     rows = [next(x for x in lines if x.startswith("asynchrony_max ")) for lines in told]
     assert ["  second  " in f"{row}  " for row in rows] == [False, True], rows
+    # Beyond them the interval of sampling alone, 0.003 wide, would look too sure.
+    random = 0.05 * np.random.default_rng(5).normal(size=COUNT)
+    far = both[1].assign(asynchrony_max=both[1]["asynchrony_max"] + 0.3 + random)
+    wider = "differences that numerical errors leave more uncertain than sampling: asynchrony_max "
+    assert any(x.startswith(f"{wider}(0.42 deg)") for x in compared(compare(both[0], far)))
+    assert not any("leave more uncertain" in x for x in told[0])
     # Alike outputs have no row, and their bars are measured all the same.
     same = compared(compare(both[0], both[0]))
     assert not any("numerical errors are not measured" in line for line in same)
@@ -408,6 +414,11 @@ def test_the_ranks_of_pairs_are_told_to_turn_round(other, words):
     assert all(words in line for line in told)
     if "little" not in words:
         assert all(line.endswith(f"asynchrony_max ({expected:+.2f})") for line in told)
+    # Draws of another distribution stand at the same place of it, and rank alike.
+    own = np.linspace(0.01, 0.02, COUNT)
+    colder = compare(with_input(seeded(VALUES), own), with_input(seeded(other), 2.0 * own))
+    assert "inputs differ in loads.force" in colder.attrs["pairing"]
+    assert [line for line in compared(colder) if "ranks of pairs" in line] == told
 
 
 def test_an_output_that_one_of_two_does_not_have_is_told_as_none():

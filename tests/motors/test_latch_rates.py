@@ -15,7 +15,15 @@ from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 from ringsim.stepping.instant import Array
-from ringsim.stepping.locks import History, Latches, Meeting, history, may_decide, meetings
+from ringsim.stepping.locks import (
+    History,
+    Latches,
+    Meeting,
+    history,
+    may_decide,
+    meetings,
+    ringing,
+)
 
 
 def meeting(times: list[float], angles: list[float], rates: list[float]) -> Meeting:
@@ -82,32 +90,49 @@ def test_a_rate_below_what_the_joint_does_next_is_uncertain() -> None:
 
 @pytest.mark.quick
 @pytest.mark.parametrize("part", [0.05, 0.1, 0.15, 0.2])
-def test_a_rate_that_rings_is_as_uncertain_as_steps_put_its_phase_wrong(part: float) -> None:
-    """A joint swings from the lock of another on, which comes a period before: the trapezoidal rule
-    swings at tan^-1(w h / 2) 2 / h instead of w, and its rate errs by that phase at most.
+@pytest.mark.parametrize("after", [0.5, 1.0, 1.5, 1.9])
+def test_a_rate_that_rings_is_uncertain_as_steps_put_its_phase_wrong(part, after) -> None:
+    """A joint swings from the lock of another on: the trapezoidal rule swings at tan^-1(w h / 2)
+    2 / h instead of w, and by its own lock the rate errs by that phase at most.
     """
-    scene, period, size, speed = load_scene("truss2"), 0.2, 0.05, 0.4
+    period, size, trend = 0.2, 0.05, 0.3
     step, omega = part * period, 2.0 * math.pi / period
     numeric = 2.0 / step * math.atan(0.5 * omega * step)
-    worst = size * (omega - numeric) * period / speed
+    lock = after * period
+    times = 7.0 + step * np.arange(-3.0, after / part + 2.0)
+    since = times - 7.0
+    rates = 0.4 + trend * since + size * np.sin(numeric * np.maximum(since, 0.0))
+    told = ringing(times, rates, np.array([7.0, np.nan, 7.0 + lock]), 7.0 + lock, period)
+    if int(after / part) + 1 < 4:  # so few steps tell nothing
+        assert told == 0.0
+        return
+    largest = size * (omega - numeric) * lock
+    assert 0.3 * largest < told < 1.2 * largest
+    # What locked long before, together with it or after it rings no more, or not yet.
+    for other in (lock - 2.1 * period, lock - 0.2 * period, lock + period):
+        assert ringing(times, rates, np.array([7.0 + other]), 7.0 + lock, period) == 0.0
+    # A rate that grows evenly does not ring.
+    assert ringing(times, 0.4 + since, np.array([7.0]), 7.0 + lock, period) < 1e-12
+
+
+@pytest.mark.quick
+def test_the_ringing_of_a_rate_is_in_what_a_run_tells_of_its_latches() -> None:
+    """As a share of the rate, no more than from which on it may be several times larger."""
+    scene, period, speed, step = load_scene("truss2"), 0.2, 0.4, 0.03
     shape = len(scene.structure.planes), scene.structure.sections
-    for lock in (0.0, -math.inf):  # the other locks, or is long past its stop
-        times = step * np.arange(-3.5, period / step + 2.0)
+    times = step * np.arange(-3.5, 12.0)
+    for size in (0.05, 0.3):
         angles, rates = np.full((len(times), *shape), math.pi - 1.0), np.zeros((len(times), *shape))
-        angles[:, 0, 0] = math.pi + np.where(lock < times, 1e-3, -1e-3)
-        since = np.maximum(times, 0.0)
-        way = speed * times + size / numeric * (1.0 - np.cos(numeric * since))
-        end = speed * period + size / numeric * (1.0 - math.cos(numeric * period))
-        angles[:, 0, 1] = math.pi + way - end
-        rates[:, 0, 1] = speed + size * np.sin(numeric * since)
-        share = history(scene, times, angles, rates, period).unsure[0, 1]
-        carried = history(scene, times, angles, rates, 1e6 * period).unsure[0, 1]
-        assert share >= carried
-        if lock == 0.0:
-            assert share == carried or 0.5 < share / worst < 1.5
-            assert share > 0.4 * worst
-        else:
-            assert share == carried
+        angles[:, 0, 0] = math.pi + np.where(times > 0.0, 1e-3, -1e-3)
+        own = speed + size * np.sin(2.0 * math.pi / period * np.maximum(times, 0.0))
+        way = np.concatenate([[0.0], np.cumsum(0.5 * step * (own[1:] + own[:-1]))])
+        angles[:, 0, 1], rates[:, 0, 1] = math.pi + way - way[-3], own
+        found = history(scene, times, angles, rates, period)
+        still = history(scene, times, angles, rates, 1e9)  # of rods that hardly swing meanwhile
+        lock = float(times[-3])
+        share = ringing(times, own, np.array([0.0, lock]), lock, period) / found.rates[0, 1]
+        assert found.unsure[0, 1] == pytest.approx(max(min(share, 0.2), still.unsure[0, 1]))
+        assert share > 0.02
 
 
 @pytest.mark.quick

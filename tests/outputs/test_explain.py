@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from click.testing import CliRunner
+from made_campaign import made_campaign, with_motors
 
+from ringsim.analysis import comparison_text
+from ringsim.analysis import study_text as study
+from ringsim.analysis.comparison import compare
+from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
@@ -59,9 +66,32 @@ def test_words_of_tables_are_explained() -> None:
         ("of the first 25 %", "of the first"), ("95 %", "quantile"),
     ):  # fmt: skip
         assert explain(head).startswith(f"{known}: {WORDS[known]}")
+    for unknown in ("lock", "flag", "maxdifference", "amping", "wors"):  # near another word
+        assert CliRunner().invoke(cli, ["explain", unknown]).exit_code == 2, unknown
     # A word that is a key, too, is told as both.
     assert "clock: offset and drift" in explain("clock")
     assert "clock (measured file)" in explain("clock")
+
+
+def test_every_head_of_the_tables_of_campaigns_is_explained() -> None:
+    """Of an analysis and of a comparison, but names of campaigns, and words that say what is below
+    them.
+    """
+    made = with_motors(made_campaign(24, stalled=(1, 4, 7)))
+    wanted = {"max": 3.0, "probability": 0.9, "confidence": 0.9}
+    made.attrs["requirements"] = json.dumps({"asynchrony_max": wanted})
+    found = analyse(made)
+    parts = [
+        *study.sections(found).values(),
+        *comparison_text.sections(compare(made, made)).values(),
+    ]
+    tables = [t for part in parts for t in (*part.tables, *getattr(part, "more", ()))]
+    heads = {head for table in tables for head in table.head if head}
+    plain = {"first", "second", "in sample", "found", "from -> to", "its", "largest", "of"}
+    plain |= {"run it again", "margin in first", "margin in second"}
+    assert len(heads) > 50
+    for head in heads - plain:
+        assert CliRunner().invoke(cli, ["explain", head]).exit_code == 0, head
 
 
 def test_no_word_of_tables_hides_a_variable() -> None:

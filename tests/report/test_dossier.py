@@ -211,7 +211,7 @@ KNOWN = {
     r"(?P<name>\w+): (?P<bad>\d+) of (?P<of>\d+) samples violate it(?:, (?P<lost>\d+) failed)?"
     r"(?:; \d+ more without a violation would prove it)?": violating,
     r"(?:(?P<names>[\w, ]+): )?(?P<count>\d+) of (?P<of>\d+) samples"
-    r"(?:, (?P<short>\d+) of them as they ended, not deployed)?(?:; largest of (?P<bars>\d+) "
+    r"(?:, (?P<short>\d+) of them not deployed, as they ended)?(?:; largest of (?P<bars>\d+) "
     rf"error bars: (?P<bar>{N}) N \(sample (?P<sample>\d+)\))?": samples,
     rf"in sample (?P<sample>\d+) it is least at (?P<angle>{N}) deg, (?P<time>{N}) s": place,
     r"in (?P<count>\d+) of (?P<of>\d+) samples the least drive margin is enough and the ring came "

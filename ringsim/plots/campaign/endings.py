@@ -113,6 +113,12 @@ def bands_by_ending(
         axes.plot(x[known], middle, color=colour, linestyle=dashes, label=label)
 
 
+def _ends_apart(curves: Array) -> bool:
+    """Whether some curves (sample, time) go on when others have ended, so that a band shrinks."""
+    known = np.isfinite(curves).sum(axis=0)
+    return bool(known.size and 0 < known[np.flatnonzero(known)[-1:]].sum() < known.max())
+
+
 def over_time(
     figure: Figure, panels: Sequence[Axes], campaign: xr.Dataset, read: xr.Dataset,
     curves: Sequence[Array], words: NDArray[np.str_],
@@ -134,10 +140,8 @@ def over_time(
     panels[0].set_xlim(time[0], min(time[max(last, 1)], until))
     panels[-1].set_xlabel(style.label(read["time"]))
     legend(figure, panels, 4)
-    shrinks = not cases and any(
-        np.isfinite(own[:, last] if own.size else own).sum() < len(own)
-        for values in curves for word in looks_of(words) for own in [values[words == word]]
-    )  # fmt: skip
+    every = [values[words == word] for values in curves for word in looks_of(words)]
+    shrinks = not cases and any(map(_ends_apart, every))
     return ran_on + " Bands are of the samples not yet over." * shrinks
 
 
@@ -183,8 +187,8 @@ def margin(campaign: xr.Dataset) -> Figure:
     """
     figure = Figure(figsize=(8.6, 6.2))
     upper, lower = figure.subplots(2, 1, height_ratios=(2, 3))
-    wanted = required_by(campaign.attrs)
-    name = next((name for name in MARGINS if name in wanted and name in campaign), MARGINS[0])
+    wanted = [name for name in MARGINS if name in required_by(campaign.attrs)]
+    name = next((each for each in wanted if values_of(campaign, each)[1].size), MARGINS[0])
     samples, values = values_of(campaign, name)
     _strips(upper, campaign, name, samples, values)
     read, words = chosen(campaign, ["drive_margin", "opening_angle"])
@@ -205,11 +209,14 @@ def margin(campaign: xr.Dataset) -> Figure:
     if ended:
         laid[np.ix_(opened, grid > min(ends) + _SAME_ANGLE)] = np.nan
     bands_by_ending(lower, grid, laid, words, cases)
-    style.margin_axis(lower, np.append(laid, values.min()), f"Margin by {standard_of(campaign)}")
+    least = values_of(campaign, MARGINS[0])[1]
+    style.margin_axis(lower, np.append(laid, least.min()), f"Margin by {standard_of(campaign)}")
     lower.axhline(0.0, **_ZERO)
     lower.set_xlabel("Mean opening angle (deg)")
     legend(figure, [lower], 4)
     note = f"{counted(campaign, words)} Dotted: the margin of 0 that the standard requires."
+    if name != MARGINS[0]:
+        note += " Above is the margin that is required; below is that of the whole drive."
     if ended:
         note += " The band of deployed samples ends where the first of them has its last record."
     if cut := int(after.any("time").sum()):
