@@ -506,14 +506,14 @@ def latches_in_doubt(campaign: xr.Dataset) -> tuple[Array, Array]:
 def open_outcomes(campaign: xr.Dataset) -> Mask:
     """Which samples would have another outcome if the latches of which it is uncertain whether they
     catch did otherwise: none that stalled before its stops, and none another latch of which has
-    missed for certain.
+    missed for certain.  A ring past its stops is overloaded by the latches that did not catch.
     """
     fate, (lost, won) = numbers(campaign, OUTCOME), latches_in_doubt(campaign)
     missed = 0.0 * won
     if "latched" in campaign:
         missed = (campaign["latched"].to_numpy() == 0).sum(axis=(1, 2))
-    some = (lost + won > 0.0) & (missed <= won)
-    return np.asarray(some & np.isin(fate, [Fate.DEPLOYED, Fate.NOT_LATCHED]))
+    of_latches = np.isin(fate, [Fate.DEPLOYED, Fate.NOT_LATCHED]) | (missed > 0.0)
+    return np.asarray((lost + won > 0.0) & (missed <= won) & of_latches)
 
 
 def _slow(campaign: xr.Dataset) -> NDArray[np.bool_]:

@@ -34,7 +34,7 @@ from ringsim.sampling.columns import Table
 from ringsim.sampling.distributions import plain
 from ringsim.storage.result import Result, check_of
 from ringsim.tables import readable, unit_text
-from ringsim.variables import GOALS, TIMINGS, Outcome
+from ringsim.variables import GOALS, TIMINGS, Fate, Outcome
 
 
 @click.command()
@@ -266,6 +266,9 @@ def _differences(result: Result, before: Result) -> list[str]:
 def changed(new: Arrays, old: Arrays) -> list[str]:
     """What a summary tells of both, and by how much the new value is larger."""
     lines = []
+    both = [each for each in (old, new) if "outcome" in each]
+    if len(fates := [Fate(int(each["outcome"])).words for each in both]) == 2:
+        lines += [f"{'outcome':<24} {' -> '.join(fates)}"] * (fates[0] != fates[1])
     for name, variable in VARIABLES.items():
         if variable.summary is None or name in TIMINGS or name not in new or name not in old:
             continue

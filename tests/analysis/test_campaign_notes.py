@@ -254,7 +254,7 @@ def test_a_verdict_says_so_if_numerical_errors_could_change_it() -> None:
             assert bool(note) == (close > 0 and (not stands or verdict == 1))
             if note and verdict != 1:
                 assert f"in {close} sample" in note
-                assert f"of the others, at most {np.hypot(*bars) / np.sqrt(2.0):.2g} N)" in note
+                assert f"ended alike, at most {np.hypot(*bars) / np.sqrt(2.0):.2g} N)" in note
                 assert not_met(found) == [f"{table.rows[0][0]}: {table.rows[0][1]}"]
             seen.add((verdict, stands))
     assert {(2, True), (2, False), (0, True)} <= seen
@@ -286,6 +286,11 @@ def test_an_outcome_says_so_if_latches_may_not_have_caught() -> None:
         also = unsure.assign(latched=(("sample", "plane", "section"), np.where(
             np.arange(4) == 2, 1, latched)))  # fmt: skip
         assert open_outcomes(also).sum() == 30 - certain
+        # Past its stops a ring is overloaded by the latch that did not catch, and by nothing else.
+        past = np.where(np.arange(30) < 20, Fate.OVERLOADED, fate)
+        assert open_outcomes(unsure.assign(outcome=("sample", past))).sum() == 30 - certain
+        both = np.where(np.arange(30) < max(certain, 20), Fate.OVERLOADED, fate)
+        assert open_outcomes(also.assign(outcome=("sample", both))).sum() == 10
         notes = verdict_table(analyse(unsure, wanted)).notes
         (note,) = (each for each in notes if "uncertain whether" in each)
         assert note.startswith(f"outcome: in {count} samples it is uncertain")
