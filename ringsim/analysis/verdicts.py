@@ -367,6 +367,7 @@ def _together_told(analysis: xr.Dataset, every: str) -> str:
         told += (
             f", a probability of at {'most' if upper else 'least'} {bound} (confidence {sure:g})"
         )
+    told += ", if their numbers hold" * bool(analysis["verdict_may_change"].any())
     return told
 
 
