@@ -138,7 +138,7 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
     # places an input has nothing in common.
     if " places)" in found.attrs["pairing"]:
         return
-    turned, tend, apart = dict[str, float](), dict[str, float](), dict[str, float]()
+    turned, tend, apart, weak = (dict[str, float]() for _ in range(4))
     still = list[str]()
     for name, variable in quantities().items():
         own = name in derived.declared()
@@ -151,14 +151,16 @@ def _turned(found: xr.Dataset) -> Iterator[str]:
             still += [name] * bool(np.isfinite(together))
             continue
         pairs = int(found[f"{name}_samples"].values[0])
-        if together < -float(largest_by_chance(pairs, np.zeros(()), 1)):
+        chance = float(largest_by_chance(pairs, np.zeros(()), 1))
+        if together < -chance:
             (turned if together < _OPPOSITE else tend)[name] = together
         elif together < _LOW:
-            apart[name] = together
+            (apart if together < chance else weak)[name] = together
     for some, sense in (
         (turned, "turn round: samples that are bad in one are good in the other"),
         (tend, "tend to turn round: samples that are bad in one are rather good in the other"),
         (apart, "hardly go together: which samples are bad in one tells little of the other"),
+        (weak, "go together weakly"),
     ):
         if some:
             named = ", ".join(f"{name} ({each:+.2f})" for name, each in some.items())

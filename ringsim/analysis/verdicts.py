@@ -339,8 +339,8 @@ def _doubts(one: Mapping[str, Any], name: str) -> list[str]:
         error = with_unit(number_text(one["numerical_error"], 2), quantities()[name].units)
         told.append(
             f"{name}: in {counted(close, 'sample')} it is closer to the limit than its numerical "
-            "error (its own error bar, or without one the root mean square of those of samples "
-            f"that ended alike, at most {error}): smaller steps, or more elements, settle it"
+            f"error (its own error bar; without one at most {error}, the root mean square of those "
+            "of samples that ended alike): smaller steps, or more elements, settle it"
         )
     if unsure:
         which = f"whether {'all' if name == OUTCOME else 'so many'} latches catch"

@@ -254,7 +254,7 @@ def test_a_verdict_says_so_if_numerical_errors_could_change_it() -> None:
             assert bool(note) == (close > 0 and (not stands or verdict == 1))
             if note and verdict != 1:
                 assert f"in {close} sample" in note
-                assert f"ended alike, at most {np.hypot(*bars) / np.sqrt(2.0):.2g} N)" in note
+                assert f"one at most {np.hypot(*bars) / np.sqrt(2.0):.2g} N, the root" in note
                 assert not_met(found) == [f"{table.rows[0][0]}: {table.rows[0][1]}"]
             seen.add((verdict, stands))
     assert {(2, True), (2, False), (0, True)} <= seen

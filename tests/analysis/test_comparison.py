@@ -401,6 +401,10 @@ def test_verdicts_on_requirements_whose_limits_differ_are_told():
             "hardly go together: which samples are bad in one tells little of the other",
         ),
         (-0.5 * VALUES + 2.0 * np.random.default_rng(4).random(COUNT), "tend to turn round"),
+        (  # beyond chance, and a tenth of the variance of ranks
+            0.35 * VALUES / VALUES.std() + 9.0 + np.random.default_rng(6).normal(size=COUNT),
+            "go together weakly",
+        ),
         (5.0 + 1e-4 * VALUES, ""),  # all the same to the digits that are told
         (5.0 - 1e-2 * VALUES, "say little of asynchrony_max"),  # they turn round by 0.2 %
     ],
