@@ -194,6 +194,15 @@ def test_draws_tell_what_lies_beyond_the_cap():
     assert two.weight == pytest.approx(1.8**2)  # both places "a"
 
 
+def test_a_law_within_a_law_is_named():
+    made = drawn_campaign(RandomDesign(samples=400), linear, 2, 1)
+    inner = {"kind": "normal", "mean": 0.5, "standard_deviation": 0.2}
+    law = {"kind": "truncated", "low": 0.1, "high": 0.9, "of": inner}
+    lines = told(analyse(made, {}, {"x1": law}), full=False)
+    words = "reweighted to x1 truncated, of (normal, mean 0.5, standard deviation 0.2), low 0.1"
+    assert any(line.startswith(words) for line in lines)
+
+
 def test_an_input_that_is_not_reweighted_keeps_its_distribution():
     made = drawn_campaign(RandomDesign(samples=4000), lambda x: x[:, 0] + x[:, 1], 2, 1)
     found = analyse(made, None, {"x2": {"kind": "uniform", "low": 0.0, "high": 0.5}})

@@ -451,7 +451,7 @@ def test_solver_process_knows_neither_mpi_nor_xarray_nor_matplotlib(ranks, bench
 
 
 def test_status_advises_no_merge_before_a_sample_has_ended(copied, monkeypatch):
-    """Checks run first, and of them alone there is nothing to merge."""
+    """Of checks alone, which may end first, there is nothing to merge."""
     monkeypatch.setattr("ringsim.campaign.plan.runs_in", lambda _: True)
     for gone, told in ((range(1, 99), "gives the results so far"), (range(99), "no sample has")):
         lose(copied, gone)

@@ -217,3 +217,24 @@ def test_what_cannot_be_exported_is_refused(
             patched.setattr(ringsim.export, bound, most)
             assert told in export(file, "--format=mat", code=2)
     assert not list(file.parent.glob("*.mat"))
+
+
+def test_counts_are_whole_numbers_and_what_is_none_is_left_as_it_is(
+    campaign: xr.Dataset, tmp_path: Path
+) -> None:
+    """Where some are missing, too, and of checks; a mean or what no count's type holds is kept."""
+    counts = np.array([12.0, 11.0, np.nan, np.nan])
+    own = {"locked_joints": counts, "locked_joints_checked": counts, "asynchrony_max": 2.0 * counts}
+    save(campaign.assign({name: ("sample", each) for name, each in own.items()}),
+         tmp_path / "campaign.nc")  # fmt: skip
+    export(tmp_path / "campaign.nc", "--format", "csv", "--out", tmp_path)
+    head, *rows = (tmp_path / "campaign-sample.csv").read_text().splitlines()
+    cells = [dict(zip(head.split(","), row.split(","), strict=True)) for row in rows]
+    for name, text in (("locked_joints", ["12", "11", "", ""]),
+                       ("locked_joints_checked", ["12", "11", "", ""])):  # fmt: skip
+        assert [row[name] for row in cells] == text
+    assert next(v for k, v in cells[0].items() if k.startswith("asynchrony_max")) == "24.0"
+    for values in ([11.5, 12.0], [3e9, 1.0], [-1.0, 2.0]):
+        save(xr.Dataset({"locked_joints": ("sample", np.array(values))}), tmp_path / "some.nc")
+        with xr.open_dataset(tmp_path / "some.nc") as found:
+            assert found["locked_joints"].values.tolist() == values
