@@ -7,6 +7,8 @@
 static const D LEAST_PIVOT = 1e-9;
 /* Unknowns of a panel at most, and columns at a time of what it leaves. */
 enum { PANEL = 16, WIDE = 24, EIGHT = 8 };
+/* Rows at once of what is taken off eight columns: a sum waits for the one before. */
+enum { ROWS = 4 };
 
 /* Invert a panel's own block of so many rows (Gauss and Jordan), on lanes that hold all its columns;
    false if a pivot is too small beside the rest of its row. */
@@ -57,6 +59,21 @@ static inline void take_off(D *left, const D *row, const D *a, I columns, I gone
     for (int q = 0; q < lanes; q++) put(left + LANES * q, x[q]);
 }
 
+/* Add so many numbers at rising places: those of a body are neighbours, as are those of bodies that
+   follow each other. */
+static inline void add_at(D *to, const I *places, const D *numbers, I count) {
+    I j = 0;
+    while (j + LANES <= count) {
+        D *own = to + places[j];
+        if (places[j + LANES - 1] - places[j] == LANES - 1) {
+            put(own, take(own) + take(numbers + j));
+            j += LANES;
+        } else
+            *own += numbers[j++];
+    }
+    for (; j < count; j++) to[places[j]] += numbers[j];
+}
+
 /* Eliminate the rows of a front that stay; those of its last panel are added to its parent. */
 static inline void reduce(D *a, I columns, I begin, I gone, I size, const D *inverse, const I *up,
                           D *parent, const int lanes) {
@@ -79,10 +96,9 @@ static inline void reduce(D *a, I columns, I begin, I gone, I size, const D *inv
                 take_off(left, row + first, panel + first, columns, gone, share, 2 * EIGHT / LANES);
             else
                 take_off(left, row + first, panel + first, columns, gone, share, EIGHT / LANES);
-            if (parent) {
-                D *to = parent + up[i] * columns;
-                for (I j = 0; j < count; j++) to[up[first + j]] += left[j];
-            } else
+            if (parent)
+                add_at(parent + up[i] * columns, up + first, left, count);
+            else
                 memcpy(row + first, left, (size_t)count * sizeof(D));
         }
         memcpy(row + begin, share, (size_t)gone * sizeof(D));
@@ -120,10 +136,22 @@ bool factor(const Mesh *mesh, const Fronts *fronts) {
     return sound;
 }
 
-/* Replace eight right-hand sides, whose rows are so far apart, by solutions. */
+/* Take rows of numbers from first to last, times eight columns whose rows are so far apart, off their
+   sums. */
+static inline void take_times(V sums[ROWS][2], const D *const rows[ROWS], I first, I last,
+                              const D *columns, I apart) {
+    for (I k = first; k < last; k++) {
+        V low = take(columns + k * apart), high = take(columns + k * apart + LANES);
+        for (int r = 0; r < ROWS; r++) sums[r][0] -= rows[r][k] * low, sums[r][1] -= rows[r][k] * high;
+    }
+}
+
+/* Replace eight right-hand sides, whose rows are so far apart, by solutions.  Where fewer rows are left
+   than are taken at once the last one stands for those that are not. */
 static void solve_eight(const Mesh *mesh, const Fronts *fronts, D *x, I apart) {
     I columns = fronts->columns;
-    V b[mesh->spots.each][2], known[PANEL][2];
+    V b[mesh->spots.each][2], known[PANEL][2], sums[ROWS][2];
+    const D *rows[ROWS];
     for (I p = 0; p < fronts->panels.n; p++) {
         const I *panel = fronts->panels.at + 3 * p;
         I begin = panel[1], gone = panel[2], size = mesh->size.at[panel[0]];
@@ -142,18 +170,18 @@ static void solve_eight(const Mesh *mesh, const Fronts *fronts, D *x, I apart) {
         }
         /* A pulley pulls on spans behind it alone. */
         if (!any(pulled)) continue;
-        /* Two rows at once: a sum waits for the one before.  An odd last row is its own twin. */
-        for (I i = begin + gone; i < size; i += 2) {
-            I twin = i + 1 < size ? i + 1 : i;
-            D *one = x + spots[i] * apart, *other = x + spots[twin] * apart;
-            const D *of_one = a + i * columns + begin, *of_other = a + twin * columns + begin;
-            V p0 = take(one), p1 = take(one + LANES), q0 = take(other), q1 = take(other + LANES);
-            for (I k = 0; k < gone; k++) {
-                p0 -= of_one[k] * known[k][0], p1 -= of_one[k] * known[k][1];
-                q0 -= of_other[k] * known[k][0], q1 -= of_other[k] * known[k][1];
+        for (I i = begin + gone; i < size; i += ROWS) {
+            I live = size - i < ROWS ? size - i : ROWS;
+            for (I r = 0; r < ROWS; r++) {
+                I row = r < live ? i + r : size - 1;
+                const D *own = x + spots[row] * apart;
+                rows[r] = a + row * columns + begin, sums[r][0] = take(own), sums[r][1] = take(own + LANES);
             }
-            put(one, p0), put(one + LANES, p1);
-            if (twin > i) put(other, q0), put(other + LANES, q1);
+            take_times(sums, rows, 0, gone, (const D *)known, EIGHT);
+            for (I r = 0; r < live; r++) {
+                D *own = x + spots[i + r] * apart;
+                put(own, sums[r][0]), put(own + LANES, sums[r][1]);
+            }
         }
     }
     for (I p = fronts->panels.n - 1; p >= 0; p--) {
@@ -165,16 +193,14 @@ static void solve_eight(const Mesh *mesh, const Fronts *fronts, D *x, I apart) {
             const D *own = x + spots[k] * apart;
             b[k][0] = take(own), b[k][1] = take(own + LANES);
         }
-        for (I i = 0; i < gone; i += 2) {
-            I twin = i + 1 < gone ? i + 1 : i;
-            const D *of_one = a + (begin + i) * columns, *of_other = a + (begin + twin) * columns;
-            V p0 = b[begin + i][0], p1 = b[begin + i][1], q0 = b[begin + twin][0], q1 = b[begin + twin][1];
-            for (I k = end; k < size; k++) {
-                p0 -= of_one[k] * b[k][0], p1 -= of_one[k] * b[k][1];
-                q0 -= of_other[k] * b[k][0], q1 -= of_other[k] * b[k][1];
+        for (I i = 0; i < gone; i += ROWS) {
+            for (I r = 0; r < ROWS; r++) {
+                I row = begin + (i + r < gone ? i + r : gone - 1);
+                rows[r] = a + row * columns, sums[r][0] = b[row][0], sums[r][1] = b[row][1];
             }
-            known[i][0] = p0, known[i][1] = p1;
-            if (twin > i) known[twin][0] = q0, known[twin][1] = q1;
+            take_times(sums, rows, end, size, (const D *)b, EIGHT);
+            for (I r = 0; r < ROWS && i + r < gone; r++)
+                known[i + r][0] = sums[r][0], known[i + r][1] = sums[r][1];
         }
         for (I i = 0; i < gone; i++) {
             V p0 = all(0.0), p1 = all(0.0);
@@ -235,24 +261,28 @@ void solve_one(const Mesh *mesh, const Fronts *fronts, D *x, I n_x) {
 
 /* Take rows, shape (count, size), times columns, (size, n) with n eights, off a corner, (count, n). */
 void take_rows(const D *rows, I count, I size, const D *columns, I n, D *corner) {
-    for (I j = 0; j < n; j += EIGHT)
-        /* Two rows at once: a sum waits for the one before.  An odd last row is its own twin. */
-        for (I i = 0; i < count; i += 2) {
-            I twin = i + 1 < count ? i + 1 : i, first = 0, last = size;
-            const D *one = rows + i * size, *other = rows + twin * size;
-            D *of_one = corner + i * n + j, *of_other = corner + twin * n + j;
-            V p0 = take(of_one), p1 = take(of_one + LANES), q0 = take(of_other), q1 = take(of_other + LANES);
+    for (I i = 0; i < count; i += ROWS) {
+        I live = count - i < ROWS ? count - i : ROWS, first = size, last = 0;
+        const D *own[ROWS];
+        for (I r = 0; r < ROWS; r++) {
+            own[r] = rows + (r < live ? i + r : count - 1) * size;
             /* A rope's rows have nothing of the others. */
-            while (first < last && one[first] == 0.0 && other[first] == 0.0) first++;
-            while (first < last && one[last - 1] == 0.0 && other[last - 1] == 0.0) last--;
-            for (I k = first; k < last; k++) {
-                V low = take(columns + k * n + j), high = take(columns + k * n + j + LANES);
-                p0 -= one[k] * low, p1 -= one[k] * high;
-                q0 -= other[k] * low, q1 -= other[k] * high;
-            }
-            put(of_one, p0), put(of_one + LANES, p1);
-            if (twin > i) put(of_other, q0), put(of_other + LANES, q1);
+            I begin = 0, end = size;
+            while (begin < end && own[r][begin] == 0.0) begin++;
+            while (begin < end && own[r][end - 1] == 0.0) end--;
+            first = begin < first ? begin : first, last = end > last ? end : last;
         }
+        for (I j = 0; j < n; j += EIGHT) {
+            D *to = corner + i * n + j;
+            V sums[ROWS][2];
+            for (I r = 0; r < ROWS; r++) {
+                const D *from = to + (r < live ? r : live - 1) * n;
+                sums[r][0] = take(from), sums[r][1] = take(from + LANES);
+            }
+            take_times(sums, own, first, last, columns + j, n);
+            for (I r = 0; r < live; r++) put(to + r * n, sums[r][0]), put(to + r * n + LANES, sums[r][1]);
+        }
+    }
 }
 
 /* Factor the border's own block D - R^T K^-1 C, whose columns are eights, with exchange of rows; its

@@ -543,10 +543,17 @@ static void add_span_tangent(const PathPoints *paths, const Arms *arms, const Sp
         for (int i = 0; i < BOTH_SIDES; i++) {
             if (local[i] < 0) continue;
             D *row = front + local[i] * columns;
-            for (int j = 0; j < BOTH_SIDES; j++)
-                if (local[j] >= 0)
-                    row[local[j]] += legs[0][i] * pulled[0][j] + legs[1][i] * pulled[1][j] +
-                                     legs[2][i] * pulled[2][j];
+            for (int first = 0; first < BOTH_SIDES; first += SIDE) {
+                /* The six of a frame are neighbours. */
+                D *to = row + local[first];
+                I angle = local[first + 6];
+                for (int j = 0; j < 6; j++)
+                    to[j] += legs[0][i] * pulled[0][first + j] + legs[1][i] * pulled[1][first + j] +
+                             legs[2][i] * pulled[2][first + j];
+                if (angle >= 0)
+                    row[angle] += legs[0][i] * pulled[0][first + 6] + legs[1][i] * pulled[1][first + 6] +
+                                  legs[2][i] * pulled[2][first + 6];
+            }
         }
     }
 }
