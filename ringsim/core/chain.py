@@ -144,7 +144,7 @@ class Chain:
         """What the spans tell, whose tensions are known."""
         ends = _whole(wound), _whole(wound_rate)
         numbers = np.empty(ropes.places["wound_rate"].stop)
-        call("read_chain", table, ropes.behind, drums, spans, log_decays, *ends, numbers)
+        call("read_chain", table, drums, spans, log_decays, *ends, numbers)
         return ChainState(ropes, table, self.friction, numbers)
 
     def changes(
@@ -199,7 +199,7 @@ class Chain:
         if self._known is None or self._known[0] is not ropes:
             self._known = ropes, self.table(ropes), Spans.empty(ropes)
         _, table, spans = self._known
-        call("measure", table, ropes.behind, _whole(points), _whole(velocities), spans)
+        call("measure", table, _whole(points), _whole(velocities), spans)
         ropes.require_length(spans.length)
         return table, spans
 
@@ -221,7 +221,7 @@ def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
     works = np.zeros(2)
     if before.ropes is after.ropes:
         rows = before.numbers, after.numbers
-        call("work_of_ropes", after.table, after.ropes.behind, *rows, works)
+        call("work_of_ropes", after.table, *rows, works)
     return float(works[0]), float(works[1])
 
 

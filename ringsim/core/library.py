@@ -56,13 +56,13 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "factor": ("tt", _TRUTH),
     "solve": ("tta", _NONE),
     "solve_one": ("tta", _NONE),
-    "measure": ("tnaat", _REAL),
+    "measure": ("taat", _REAL),
     "wind": ("taat", _NONE),
     "slide": ("ttt", _NONE),
     "tighten": ("ttat", _NONE),
-    "read_chain": ("tnttaaaa", _NONE),
-    "work_of_ropes": ("tnaaa", _NONE),
-    "pull_tight": ("tnttaat", _REAL),
+    "read_chain": ("tttaaaa", _NONE),
+    "work_of_ropes": ("taaa", _NONE),
+    "pull_tight": ("tttaat", _REAL),
     "factors_needed": ("ta", _WHOLE),
     "tension_changes": ("ttaaataarraa", _NONE),
     "spread_changes": ("ttaaa", _NONE),
@@ -232,14 +232,20 @@ def _packed(table: Any) -> _Packed:
 
 
 @cache
+def _kinds(kind: type) -> tuple[Any, ...]:
+    """Annotations of a kind of table."""
+    return tuple(get_type_hints(kind).values())
+
+
+@cache
 def _fields(kind: type) -> list[str]:
     """What the fields of a kind of table are, as of ``_FUNCTIONS``."""
-    return [_KINDS.get(each, "t") for each in get_type_hints(kind).values()]
+    return [_KINDS.get(each, "t") for each in _kinds(kind)]
 
 
 def words_of(kind: type) -> int:
     """Words of a kind of table."""
-    nested = iter(each for each in get_type_hints(kind).values() if each not in _KINDS)
+    nested = iter(each for each in _kinds(kind) if each not in _KINDS)
     each = {"a": 3, "n": 3, "r": 1, "w": 1}
     return sum(each.get(letter) or words_of(next(nested)) for letter in _fields(kind))
 
@@ -250,8 +256,7 @@ Table = TypeVar("Table", bound=tuple[Any, ...])
 def empty_of(kind: type[Table]) -> Table:
     """A table whose arrays have no rows, and whose numbers are zero: of what a scene has not."""
     kinds = {"a": np.zeros(0), "n": np.zeros(0, np.int64), "r": 0.0, "w": 0}
-    each = get_type_hints(kind).values()
-    found = (kinds[_KINDS[k]] if k in _KINDS else empty_of(k) for k in each)
+    found = (kinds[_KINDS[k]] if k in _KINDS else empty_of(k) for k in _kinds(kind))
     return cast(Table, cast(Any, kind)(*found))
 
 

@@ -53,8 +53,9 @@ from ringsim.core.library import call
 class RopeTable(NamedTuple):
     """What faults alone change: first span of each rope and one more than the last, first points of
     the spans, pulley before each span (-1: none, or jammed there), whether spans are felt, as they
-    are between different frames; rope without what winches have wound (m), and whether it is whole;
-    EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope; slip speeds of the pulleys, m/s.
+    are between different frames; span behind each pulley; rope without what winches have wound (m),
+    and whether it is whole; EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope; slip
+    speeds of the pulleys, m/s.
     """
 
     starts: Indices
@@ -62,6 +63,7 @@ class RopeTable(NamedTuple):
     near: Indices
     pulley: Indices
     felt: Indices
+    behind: Indices
     content: Array
     alive: Array
     material: Array
@@ -76,7 +78,8 @@ class RopeTable(NamedTuple):
         own = np.zeros(ropes.spans, dtype=np.int64)
         own[felt] = 1
         return cls(
-            ropes.starts, ropes.ends, ropes.near, pulley, own, np.array(ropes.content, dtype=float),
+            ropes.starts, ropes.ends, ropes.near, pulley, own, ropes.behind,
+            np.array(ropes.content, dtype=float),
             ropes.alive.astype(float),
             material[:, ropes.cable].T.copy(), slip_speed,
         )  # fmt: skip

@@ -124,9 +124,10 @@ class Answering(NamedTuple):
 
 def driving(winches: Mapping[tuple[int, int], Winch], time: float, state: ChainState) -> bool:
     """Whether any winch, by cable and end, turns or will turn on a rope that is whole."""
-    whole, rate = state.ropes.alive[state.ropes.of_end], state.wound_rate
+    ropes, rate = state.ropes, state.wound_rate
     return any(
-        whole[place] and winch.drives(time, float(rate[place])) for place, winch in winches.items()
+        winch.drives(time, float(rate[place])) and bool(ropes.alive[ropes.of_end[place]])
+        for place, winch in winches.items()
     )
 
 
@@ -140,6 +141,7 @@ class Winches:
             for end, winch in enumerate(cable.winches)
         }
         self._given = dict(self._winches)
+        self._commands: Array | None = None
         self._start, self._held = 0.0, np.zeros((len(cables), 2))
         self._rates = np.zeros_like(self._held)
         self._moves = any(cable.friction.moves for cable in cables)
@@ -158,8 +160,10 @@ class Winches:
         asking = {
             n for (n, _), w in self._winches.items() if isinstance(w.winding, FeedbackWinding)
         }
-        found = [slope(n) if n in asking else 0.0 for n in range(len(self._held))]
-        return np.array(found)
+        found = np.zeros(len(self._held))
+        for n in asking:
+            found[n] = slope(n)
+        return found
 
     @property
     def answering(self) -> bool:
@@ -262,6 +266,7 @@ class Winches:
         """
         self._start, self._held, self._rates, self._slopes, ropes = memory["begun"]
         self._begun = {k: (path, natural) for k, path, natural in ropes}
+        self._commands = None
         for number, end, table, ahead, turning in memory["winches"]:
             place = number, end
             # As the scene has it: a controller has commanded the winch of this run already.
@@ -289,7 +294,7 @@ class Winches:
             if early or winch.turns(time + AT_ONCE):
                 law = winch.winding.told(speed, max(time - winch.start_time, 0.0))
                 if law is not winch.winding:
-                    changed = True
+                    changed, self._commands = True, None
                     self._winches[place] = winch.model_copy(update={"winding": law})
         return changed
 
@@ -302,18 +307,19 @@ class Winches:
         """Speeds that winches are told by a controller, or could be, m/s, shape (cables, 2); NaN of
         others.
         """
-        found = np.full(self._held.shape, math.nan)
-        for place, winch in self._winches.items():
-            if winch.winding.commandable:
-                found[place] = winch.winding.commanded_speed()
-        return found
+        if self._commands is None:
+            self._commands = np.full(self._held.shape, math.nan)
+            for place, winch in self._winches.items():
+                if winch.winding.commandable:
+                    self._commands[place] = winch.winding.commanded_speed()
+        return self._commands
 
     def lock(self, number: int, time: float, state: ChainState) -> None:
         """The plane of a cable has locked at a time (s): its winches do what they do then."""
         for place, winch in self._winches.items():
             if place[0] == number and winch.after_lock != "pull":
                 tension = float(state.winch_tensions[place])
-                self._winches[place] = winch.locked(time, tension)
+                self._winches[place], self._commands = winch.locked(time, tension), None
 
     def driving(self, time: float, state: ChainState) -> bool:
         """Whether any winch turns or will turn on a rope that is whole."""
@@ -330,10 +336,8 @@ class Winches:
         what turned before no longer counts.
         """
         ropes, roped = ropes or state.ropes, roped or state.table
-        last, moved, past = time - self._start, state.wound - self._held, self._turning
-        rates, begun = self._rates, self._begun
-        paths, natural = ropes.along(state.lengths), ropes.content - ropes.per_rope(state.wound)
-        bends = (slopes - self._slopes) / last if last > 0.0 else 0.0 * slopes
+        last, before, past = time - self._start, self._held, self._turning
+        rates, begun, turned = self._rates, self._begun, self._slopes
         self._start, self._held, self._slopes = time, state.wound, slopes
         self._rates, self._turning, self._begun = state.wound_rate, {}, {}
         for place, winch in self._winches.items():
@@ -341,6 +345,9 @@ class Winches:
                 self._turning[place] = winch.winding
         if not self._turning:
             return
+        moved = self._held - before
+        paths, natural = ropes.along(state.lengths), ropes.content - ropes.per_rope(self._held)
+        bends = (slopes - turned) / last if last > 0.0 else 0.0 * slopes
         table = self.table(ropes)
         self._at = _Begun(table, roped, state.friction, state.pulleys)
         for own in (table.on, table.past, table.balance):

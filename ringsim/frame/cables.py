@@ -126,13 +126,12 @@ _DECAY = 3
 
 
 class Roped(NamedTuple):
-    """Ropes as faults leave them, with what their winches do and how they run: first spans behind
-    the pulleys, slopes of the pulleys' friction (s/m), the share of a change of path that stretches
-    each rope, room for changes of tension in factors, and the border of the fronts that they make.
+    """Ropes as faults leave them, with what their winches do and how they run: slopes of the
+    pulleys' friction (s/m), the share of a change of path that stretches each rope, room for
+    changes of tension in factors, and the border of the fronts that they make.
     """
 
     ropes: RopeTable
-    behind: Indices
     winches: Answering
     drums: Drums
     spans: Spans
@@ -159,7 +158,7 @@ class Roped(NamedTuple):
         pulleys, spans, count = len(ropes.behind), ropes.spans, len(table.starts)
         most = call("factors_needed", table, np.ones(pulleys))
         return cls(
-            table, ropes.behind, winches, Drums.still(count), Spans.empty(ropes),
+            table, winches, Drums.still(count), Spans.empty(ropes),
             Seen.empty(pulleys), np.zeros(pulleys), np.ones(count), np.zeros((most, spans)),
             np.zeros((most, spans, 3)), np.zeros((2, most, points, 3)),
             Border.empty(unknowns, most, points, hub),
@@ -226,7 +225,7 @@ class FrameCables:
         """The chain at places and rates of all points; ValueError if it has no answer."""
         self.turn(time)
         if self.winches.answering:
-            call("measure", self.roped.ropes, self.roped.behind, places, rates, self.roped.spans)
+            call("measure", self.roped.ropes, places, rates, self.roped.spans)
             self.winches.answer_in(lambda function: call("answer_ropes", self.roped, function))
             self._turned = _Turned(*self.roped.winches.turned.copy())
         return self._tightened(places, rates)
@@ -235,12 +234,20 @@ class FrameCables:
         """The chain with its winches as they have turned."""
         roped = self.roped
         least = call(
-            "pull_tight", roped.ropes, roped.behind, roped.drums, self.laws, places, rates,
-            roped.spans,
+            "pull_tight", roped.ropes, roped.drums, self.laws, places, rates, roped.spans,
         )  # fmt: skip
         if not (least > SHORTEST and roped.drums.natural.min() > 0.0):  # NaN without an answer
             self.refuse(places, rates)
-        log_decays = self.laws.decays.rows[_DECAY].copy()
+        return self._read()
+
+    def balanced(self) -> ChainState:
+        """The chain as Newton's last residual of a step has left it."""
+        if self.winches.answering:
+            self._turned = _Turned(*self.roped.winches.turned.copy())
+        return self._read()
+
+    def _read(self) -> ChainState:
+        roped, log_decays = self.roped, self.laws.decays.rows[_DECAY]
         return self.chain.read(
             self.ropes, roped.ropes, roped.drums, roped.spans, log_decays, *self._turned
         )

@@ -68,7 +68,7 @@ class Integration(Run):
         self._readings = FrameMeters(model)
         self.history = Recorder(scene, self._readings.coordinates(), model.layout)
         ropes = None if model.cables is None else model.cables.ropes.content
-        first = self._measure(0.0, self._now)
+        first = self._measured(0.0)
         self._set_out(
             first,
             scales_of(scene, model.layout, model.ideal, ropes),
@@ -123,10 +123,9 @@ class Integration(Run):
         call("set_out", self.model.mesh, self._now.table, after.table, self._guess(step))
         self._damp(step, after)
         self._newton(time, step, after)
-        try:
-            return after, self._measure(time, after)
-        except ValueError as error:  # the winches have no answer
-            raise NoBalanceError(str(error)) from error
+        if self.model.cables is not None:
+            after.chain = self.model.cables.balanced()
+        return after, self._known(time, after)
 
     def _damp(self, step: float, after: State) -> None:
         """Let rates of strains follow from strains: the backward differences of second order of
@@ -186,17 +185,13 @@ class Integration(Run):
 
     def _measured(self, time: float) -> Instant:
         """See ``Run``."""
-        return self._measure(time, self._now)
-
-    def _measure(self, time: float, state: State) -> Instant:
-        """A state, with its cables, and what has passed since the one that was kept last."""
-        cables = self.model.cables
+        cables, state = self.model.cables, self._now
         if cables is not None:
             state.chain = cables.state(time, state.place.paths, state.rate.paths)
         return self._known(time, state)
 
     def _known(self, time: float, state: State) -> Instant:
-        """A state whose chain is known."""
+        """A state whose chain is known, and what has passed since the one that was kept last."""
         angles, rates = self.model.openings.read(state.pose.angle, state.rate.angles)
         energies, gap = self._energy.read(time, state)
         return self._told(time, angles, rates, energies, gap, state.chain)

@@ -214,7 +214,7 @@ class Openings(NamedTuple):
 
     def read(self, angles: Array, rates: Array) -> tuple[Array, Array]:
         """Opening angles and rates, rad and rad/s."""
-        return np.pi - self.sense * angles[self.angle], -self.sense * rates[self.angle]
+        return np.pi - self.sense * angles.take(self.angle), -self.sense * rates.take(self.angle)
 
 
 def _followed(skeleton: Skeleton, opening: JointOpening) -> tuple[int, float]:

@@ -282,13 +282,18 @@ class Parts:
             self._require_neighbours({(home - place) // self._width for home in bodies})
             spots += [home + k for home in bodies for k in range(6)]
         self._add_fronts(parts, inner)
+        self._places: dict[int, dict[int, int]] = {}
 
     def local(self, front: int, ends: Sequence[tuple[int, int]]) -> list[int]:
         """Places in a front of the unknowns of frames and angles: six and one, -1 for no angle."""
-        where = {int(spot): k for k, spot in enumerate(self.spots[front, : self.size[front]])}
+        where = self._places.get(front)
+        if where is None:
+            spots = self.spots[front, : self.size[front]].tolist()
+            where = self._places[front] = {spot: k for k, spot in enumerate(spots)}
         found: list[int] = []
         for frame, angle in ends:
-            found += [where[int(self.home[frame]) + k] for k in range(6)]
+            first = where[int(self.home[frame])]  # the six of a frame are neighbours
+            found += range(first, first + 6)
             found.append(where[int(self.angle_home[angle])] if angle >= 0 else -1)
         return found
 

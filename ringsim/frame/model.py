@@ -231,7 +231,7 @@ class FrameModel:
     def work(self, state: State) -> float:
         """Of loads and gravity since the start, as they act now, J."""
         at, start, forces = self._loaded
-        done = float(np.vdot(forces, state.pose.place[at] - start))
+        done = float(np.vdot(forces, state.pose.place[at] - start)) if at.size else 0.0
         if self._held.weighs:
             moved = self.masses @ (state.place.points - self._begun)
             if self.with_hub:

@@ -164,7 +164,7 @@ class Rod:
         """Without point masses, kg."""
         return self.density * self.tube.area * self.length
 
-    @property
+    @cached_property
     def lengths(self) -> Array:
         """Of its elements, m."""
         return np.diff(self.stations) * self.length

@@ -26,6 +26,7 @@ from ringsim.layout.bodies import (
     Pose,
     Rod,
     axes_along,
+    cross,
     pose_of,
     rate_of,
     real_of,
@@ -431,15 +432,19 @@ class Draft:
         mount: Mount
         if isinstance(part, BodyRef):
             pose = self.bodies[part.number].pose
-            mount = OnBody(part.number, pose.axes.T @ (place - pose.place), pose.axes.T @ axes)
+            arm = place - pose.place
+            there, moving = place, pose.rate + cross(pose.turn.tolist(), arm.tolist())
+            mount = OnBody(part.number, pose.axes.T @ arm, pose.axes.T @ axes)
         else:
             rod = self.rods[part.number]
             size = max(rod.length, 1.0)
             share = float((place - rod.start.place) @ rod.start.axes[:, 0]) / rod.length
             off = [abs(station - share) for station in rod.stations]
             mount = OnRod(part.number, off.index(min(off)))
-        there = pose_of(mount, self.bodies, self.rods)
-        apart = max(np.abs(there.place - place).max(), np.abs(there.rate - rate_of(at)).max())
+            node = rod.node(mount.station)
+            there, moving = node.place, node.rate
+        differences = *(there - place).tolist(), *(moving - rate_of(at)).tolist()
+        apart = max(map(abs, differences))
         if apart > _CLOSE * size:
             raise ValueError(
                 f"a {what} is {apart:.3g} m away from a part that it connects, at some opening "

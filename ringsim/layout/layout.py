@@ -97,6 +97,10 @@ class PointMasses(NamedTuple):
     rates: Array
 
 
+_AXES = np.vstack([np.eye(3), -np.eye(3)])
+"""Directions of six points about their middle."""
+
+
 class Half(NamedTuple):
     """Elements ``first`` to ``last`` - 1 of a rod."""
 
@@ -180,8 +184,8 @@ class Layout:
         for rod in self.rods:
             middle, tube = rod.station(0.5), rod.tube
             across = math.sqrt(3.0 * tube.second_moment / tube.area)
-            arms = np.diag([0.5 * rod.length, across, across])
-            parts.append((rod.mass * sixth, -1, *middle.at(np.concatenate([arms, -arms]))))
+            arms = _AXES * (0.5 * rod.length, across, across)
+            parts.append((rod.mass * sixth, -1, *middle.at(arms)))
             for station, mass, _ in rod.masses:
                 pose = rod.station(rod.stations[station])
                 parts.append((np.array([mass]), -1, pose.place[None], pose.rate[None]))

@@ -104,8 +104,10 @@ class Locks(Remembering):
         that and this step goes on for long behind it; or one that leads towards a latch of which
         this one leaves open whether it catches; else None.  None is below ``least`` (s).
         """
+        if found.angles.max() < math.pi:
+            return None
         step, wanted = found.time - before.time, list[float]()
-        for row in self._acted_on if found.angles.max() >= math.pi else ():
+        for row in self._acted_on:
             there = found.angles[row] >= math.pi
             if (self.deployed[row] | there).all() and not self.deployed[row].all():
                 times, angles, rates = (
@@ -117,7 +119,7 @@ class Locks(Remembering):
                 wanted.append(float(np.fmax.reduce(left)) - before.time)
         # The first of two planes leaves its step to the other.
         ending = max(min(wanted, default=step) * (1.0 + 0.5 * _LATE), least)
-        if self._latches is not None and found.angles.max() >= math.pi:
+        if self._latches is not None:
             # Half-way to it: rates that are read nearer to the stop are surer.
             open_ = self._latches.undecided(before, found) - before.time
             ending = min(ending, max(0.5 * open_, least))
@@ -167,11 +169,14 @@ class Locks(Remembering):
         Those that came to 180 deg and that no latch holds may come there again.
         """
         angles, rates, low, high = now.angles, now.rates, self._stowed_angle, math.pi
-        away, some = ~self.deployed, bool(self.deployed.any())
-        if some and self._latches is not None:
-            away |= self._latches.missing(self.deployed) & (angles <= high - _NEAR)
+        ahead, some = rates > 0.0, bool(self.deployed.any())
+        if some:
+            away = ~self.deployed
+            if self._latches is not None:
+                away |= self._latches.missing(self.deployed) & (angles <= high - _NEAR)
+            ahead &= away
         waiting = np.full(rates.shape, math.inf)
-        np.divide(high - angles, rates, out=waiting, where=(rates > 0.0) & away)
+        np.divide(high - angles, rates, out=waiting, where=ahead)
         if rates.min() < 0.0:
             folding = (rates < 0.0) & self._away & ~self.stowed & (angles > low)
             np.divide(low - angles, rates, out=waiting, where=folding)

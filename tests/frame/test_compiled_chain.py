@@ -56,7 +56,7 @@ class Case:
         natural = self.ropes.content - self.ropes.per_rope(self.wound)
         self.drums = Drums(natural, self.ropes.per_rope(self.wound_rate), inflow)
         self.spans = Spans.empty(self.ropes)
-        least = call("measure", self.table, self.ropes.behind, self.points, self.rates, self.spans)
+        least = call("measure", self.table, self.points, self.rates, self.spans)
         assert least == pytest.approx(self.spans.length.min())
         self.log_decays = self.evaluated().log_decays
         call("slide", self.table, self.drums, self.spans)

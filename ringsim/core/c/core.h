@@ -209,7 +209,7 @@ typedef struct {
 
 /* ringsim.core.tension */
 typedef struct {
-    Ints starts, ends, near, pulley, felt;
+    Ints starts, ends, near, pulley, felt, behind;
     Reals content, alive, material, slip_speed;
 } RopeTable;
 
@@ -232,7 +232,6 @@ typedef struct {
 /* ringsim.frame.cables.Roped */
 typedef struct {
     RopeTable ropes;
-    Ints behind;
     Answering winches;
     Drums drums;
     Spans spans;
@@ -324,8 +323,8 @@ bool balance(const Mesh *mesh, const PathPoints *paths, const Held *held, const 
 void differentiate(const Mesh *mesh, const Held *held, const Acting *joints, const Web *web,
                    const Pose *pose, const Followed *now, const D *loads, D lead, D by_rate,
                    D by_place, bool strung, const Fronts *fronts, const Border *border, I wide);
-D measure(const RopeTable *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
-          I n_rates, const Spans *spans);
+D measure(const RopeTable *ropes, const D *places, I n_places, const D *rates, I n_rates,
+          const Spans *spans);
 Place place_behind(const RopeTable *ropes, I rope, Place before);
 D tension_of(const D *material, D natural, D winding, Path path);
 void wind(const RopeTable *ropes, const D *wound, I n_wound, const D *rates, I n_rates, const Drums *drums);

@@ -84,9 +84,11 @@ void read_energies(const System *system, const Moving *now, D step, D *passing, 
 
 /* Two rows of a chain: works (J) from one to the other, put in by the winches less what is wound up,
    and lost; see ringsim.core.chain.work_between. */
-void work_of_ropes(const RopeTable *ropes, const I *behind, I pulleys, const D *before, I n_before,
-                   const D *after, I n_after, D *out, I n_out) {
+void work_of_ropes(const RopeTable *ropes, const D *before, I n_before, const D *after, I n_after,
+                   D *out, I n_out) {
     (void)n_before, (void)n_after, (void)n_out;
+    const I *behind = ropes->behind.at;
+    I pulleys = ropes->behind.n;
     I count = ropes->starts.n, n = ropes->near.n, forces = 7 * n + 4 * pulleys, held = forces + pulleys;
     I natural = held + pulleys, strains = natural + 4 * count, viscous = natural + 8 * count;
     I density = viscous + count, wound = density + count, j = 0;

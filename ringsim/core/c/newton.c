@@ -60,7 +60,7 @@ I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, c
         const D *places = now->followed.place.at + cuts[PATHS];
         rates += cuts[PATHS];
         if (asks & WINCHES) {
-            measure(&roped->ropes, roped->behind.at, roped->behind.n, places, 0, rates, 0, &roped->spans);
+            measure(&roped->ropes, places, 0, rates, 0, &roped->spans);
             I how = answer_ropes(roped, ask);
             if (how != BALANCED) return how;
         }

@@ -8,9 +8,10 @@ static const D STRAIGHT = 1e-7;
 
 /* Lengths, rates, directions and angles of places and rates of the points; returns the least
    length, m. */
-D measure(const RopeTable *ropes, const I *behind, I pulleys, const D *places, I n_places, const D *rates,
-          I n_rates, const Spans *spans) {
+D measure(const RopeTable *ropes, const D *places, I n_places, const D *rates, I n_rates,
+          const Spans *spans) {
     (void)n_places, (void)n_rates;
+    const I *behind = ropes->behind.at;
     D least = INFINITY;
     for (I i = 0; i < spans->length.n; i++) {
         I k = 3 * ropes->near.at[i];
@@ -22,7 +23,7 @@ D measure(const RopeTable *ropes, const I *behind, I pulleys, const D *places, I
         store_vector(spans->unit.at + 3 * i, unit);
         spans->rate.at[i] = dot(unit, minus(vector(rates + k + 3), vector(rates + k)));
     }
-    for (I j = 0; j < pulleys; j++) {
+    for (I j = 0; j < ropes->behind.n; j++) {
         Vec before = vector(spans->unit.at + 3 * (behind[j] - 1)), after = vector(spans->unit.at + 3 * behind[j]);
         Vec both = plus(before, after), apart = minus(after, before);
         spans->angle.at[j] = 2.0 * atan2(sqrt(dot(both, both)), sqrt(dot(apart, apart)));
@@ -166,11 +167,12 @@ static D *append(D *to, const D *from, I n) {
 }
 
 /* What a chain tells whose spans are known, one behind the other (ringsim.cable.ropes.CHAIN_PARTS). */
-void read_chain(const RopeTable *ropes, const I *behind, I pulleys, const Drums *drums, const Spans *spans,
-                const D *log_decays, I n_log_decays, const D *wound, I n_wound, const D *wound_rate,
-                I n_wound_rate, D *out, I n_out) {
+void read_chain(const RopeTable *ropes, const Drums *drums, const Spans *spans, const D *log_decays,
+                I n_log_decays, const D *wound, I n_wound, const D *wound_rate, I n_wound_rate, D *out,
+                I n_out) {
     (void)n_log_decays, (void)n_out;
-    I count = ropes->starts.n, n = spans->length.n, j = pulleys - 1;
+    const I *behind = ropes->behind.at;
+    I count = ropes->starts.n, n = spans->length.n, pulleys = ropes->behind.n, j = pulleys - 1;
     out = append(append(out, spans->length.at, n), spans->rate.at, n);
     out = append(append(out, spans->tension.at, n), spans->share.at, n);
     out = append(append(out, spans->unit.at, 3 * n), spans->angle.at, pulleys);
@@ -202,9 +204,10 @@ void read_chain(const RopeTable *ropes, const I *behind, I pulleys, const Drums 
 }
 
 /* Let laws see the pulleys (ringsim.cable.friction.Pulleys). */
-static void show(const I *behind, I pulleys, const Spans *spans, const PulleyLaws *laws, const Tape *tape) {
+static void show(const RopeTable *ropes, const Spans *spans, const PulleyLaws *laws, const Tape *tape) {
+    const I *behind = ropes->behind.at;
     D *angle = row_of(tape, 0), *speed = row_of(tape, 1), *tension = row_of(tape, 2);
-    for (I j = 0; j < pulleys; j++) {
+    for (I j = 0; j < ropes->behind.n; j++) {
         D both = 0.5 * (spans->tension.at[behind[j] - 1] + spans->tension.at[behind[j]]);
         angle[j] = spans->angle.at[j], speed[j] = fabs(spans->speed.at[j]);
         tension[j] = larger(both, laws->least_tension);
@@ -216,13 +219,14 @@ enum { DECAY = 3, BY_ANGLE = 3, BY_SPEED };
 
 /* Spans, with their tensions, at places and rates of the points; returns the least length, NaN if no
    tensions go with the friction. */
-D pull_tight(const RopeTable *ropes, const I *behind, I pulleys, const Drums *drums, const PulleyLaws *laws,
-             const D *places, I n_places, const D *rates, I n_rates, const Spans *spans) {
-    D least = measure(ropes, behind, pulleys, places, n_places, rates, n_rates, spans);
+D pull_tight(const RopeTable *ropes, const Drums *drums, const PulleyLaws *laws, const D *places,
+             I n_places, const D *rates, I n_rates, const Spans *spans) {
+    D least = measure(ropes, places, n_places, rates, n_rates, spans);
+    I pulleys = ropes->behind.n;
     D *decays = row_of(&laws->decays, DECAY), before[pulleys + 1];
     slide(ropes, drums, spans);
     if (!laws->loads) {
-        show(behind, pulleys, spans, laws, &laws->decays);
+        show(ropes, spans, laws, &laws->decays);
         play(&laws->decays);
         tighten(ropes, drums, decays, pulleys, spans);
         return least;
@@ -231,7 +235,7 @@ D pull_tight(const RopeTable *ropes, const I *behind, I pulleys, const Drums *dr
     memset(before, 0, sizeof before);
     tighten(ropes, drums, decays, pulleys, spans);
     for (I n = 0; n < laws->most; n++) {
-        show(behind, pulleys, spans, laws, &laws->decays);
+        show(ropes, spans, laws, &laws->decays);
         play(&laws->decays);
         tighten(ropes, drums, decays, pulleys, spans);
         D change = 0.0;
@@ -282,9 +286,9 @@ D limit_of_ropes(I number) { return number == 0 ? SHORTEST : PASSING; }
 I find_slopes(const Roped *roped, const PulleyLaws *laws) {
     const RopeTable *ropes = &roped->ropes;
     const Spans *spans = &roped->spans;
-    I pulleys = roped->behind.n;
+    I pulleys = ropes->behind.n;
     D *slopes = roped->slopes.at;
-    show(roped->behind.at, pulleys, spans, laws, &laws->slopes);
+    show(ropes, spans, laws, &laws->slopes);
     play(&laws->slopes);
     const D *decays = row_of(&laws->decays, DECAY), *by_speed = row_of(&laws->slopes, BY_SPEED);
     for (I j = 0; j < pulleys; j++) {
@@ -462,8 +466,7 @@ D pull_cables(const System *system, const Roped *roped, const D *places, const D
     const PathPoints *paths = &system->paths;
     const Arms *arms = &system->arms;
     const Spans *spans = &roped->spans;
-    D least = pull_tight(&roped->ropes, roped->behind.at, roped->behind.n, &roped->drums,
-                         &system->laws, places, 0, rates, 0, spans);
+    D least = pull_tight(&roped->ropes, &roped->drums, &system->laws, places, 0, rates, 0, spans);
     for (I s = 0; s < paths->span.n; s++) {
         I span = paths->span.at[s];
         Vec force = times(spans->tension.at[span], vector(spans->unit.at + 3 * span));
