@@ -342,7 +342,8 @@ class Draft:
             axes = rods[0].start.axes if rods else SPACE
         if parts[1] is None:  # a place in space comes first, as those who read supports expect
             parts = parts[::-1]
-        first, second = (self._mount(part, at, real_of(axes), family or kind) for part in parts)
+        where, own = (real_of(at), rate_of(at)), real_of(axes)
+        first, second = (self._mount(part, *where, own, family or kind) for part in parts)
         if error is not None:
             assert isinstance(second, OnBody)
             error = self.bodies[second.body].pose.axes.T @ error
@@ -365,7 +366,7 @@ class Draft:
 
     def on(self, body: BodyRef, at: Any) -> Mount:
         """A place on a body that carries it."""
-        return self._mount(body, at, SPACE, "sheave")
+        return self._mount(body, real_of(at), rate_of(at), SPACE, "sheave")
 
     def finish(self) -> Layout:
         """The layout, with boom, net, loads and cables of the scene."""
@@ -425,8 +426,10 @@ class Draft:
         sections = np.array([self.joints[number].section for number in own])
         return Rub(family, law, tuple(own), sections)
 
-    def _mount(self, part: Part | None, at: Any, axes: Array, what: str) -> Mount:
-        place, size = real_of(at), 1.0
+    def _mount(
+        self, part: Part | None, place: Array, rate: Array, axes: Array, what: str
+    ) -> Mount:  # fmt: skip
+        size = 1.0
         if part is None:
             return InSpace(place, axes)
         mount: Mount
@@ -443,7 +446,7 @@ class Draft:
             mount = OnRod(part.number, off.index(min(off)))
             node = rod.node(mount.station)
             there, moving = node.place, node.rate
-        differences = *(there - place).tolist(), *(moving - rate_of(at)).tolist()
+        differences = *(there - place).tolist(), *(moving - rate).tolist()
         apart = max(map(abs, differences))
         if apart > _CLOSE * size:
             raise ValueError(
