@@ -132,7 +132,16 @@ def driving(winches: Mapping[tuple[int, int], Winch], time: float, state: ChainS
 
 
 class Winches:
-    """Rope wound and speeds at both ends of each cable."""
+    """Rope wound and speeds at both ends of each cable.
+
+    Attributes
+    ----------
+    commands
+        Speeds that winches are told by a controller, or could be, m/s, shape (cables, 2); NaN of
+        others.
+    """
+
+    commands: Array
 
     def __init__(self, cables: Sequence[Cable]) -> None:
         self._winches = {
@@ -141,7 +150,6 @@ class Winches:
             for end, winch in enumerate(cable.winches)
         }
         self._given = dict(self._winches)
-        self._commands: Array | None = None
         self._start, self._held = 0.0, np.zeros((len(cables), 2))
         self._rates = np.zeros_like(self._held)
         self._moves = any(cable.friction.moves for cable in cables)
@@ -152,6 +160,7 @@ class Winches:
         """Path and natural length (m) of every rope that answers, where the step began."""
         self._known: tuple[Ropes, Answering] | None = None
         self._at: _Begun | None = None
+        self._tell()
 
     def path_slopes(self, slope: Callable[[int], float]) -> Array:
         """Derivatives of the cables' ideal paths after the opening angle, m/rad, shape (cables,),
@@ -266,7 +275,6 @@ class Winches:
         """
         self._start, self._held, self._rates, self._slopes, ropes = memory["begun"]
         self._begun = {k: (path, natural) for k, path, natural in ropes}
-        self._commands = None
         for number, end, table, ahead, turning in memory["winches"]:
             place = number, end
             # As the scene has it: a controller has commanded the winch of this run already.
@@ -282,6 +290,7 @@ class Winches:
                 ahead = float(wound[place]) - by_law
             if ahead and not isinstance(self._winches[place].winding, FeedbackWinding):
                 self._ahead[place] = ahead
+        self._tell()
 
     def command(self, time: float, speeds: Mapping[tuple[int, int], float]) -> bool:
         """Let winches have the speeds (m/s) that a controller commands at a time (s), or have them
@@ -294,8 +303,9 @@ class Winches:
             if early or winch.turns(time + AT_ONCE):
                 law = winch.winding.told(speed, max(time - winch.start_time, 0.0))
                 if law is not winch.winding:
-                    changed, self._commands = True, None
+                    changed = True
                     self._winches[place] = winch.model_copy(update={"winding": law})
+        self._tell()
         return changed
 
     def next_bend(self, time: float) -> float:
@@ -303,23 +313,20 @@ class Winches:
         bends = (bend for winch in self._winches.values() for bend in winch.breaks())
         return min((bend for bend in bends if bend > time + AT_ONCE), default=math.inf)
 
-    def commands(self) -> Array:
-        """Speeds that winches are told by a controller, or could be, m/s, shape (cables, 2); NaN of
-        others.
-        """
-        if self._commands is None:
-            self._commands = np.full(self._held.shape, math.nan)
-            for place, winch in self._winches.items():
-                if winch.winding.commandable:
-                    self._commands[place] = winch.winding.commanded_speed()
-        return self._commands
+    def _tell(self) -> None:
+        """Note what winches are told, since another law has come to some."""
+        self.commands = np.full(self._held.shape, math.nan)
+        for place, winch in self._winches.items():
+            if winch.winding.commandable:
+                self.commands[place] = winch.winding.commanded_speed()
 
     def lock(self, number: int, time: float, state: ChainState) -> None:
         """The plane of a cable has locked at a time (s): its winches do what they do then."""
         for place, winch in self._winches.items():
             if place[0] == number and winch.after_lock != "pull":
                 tension = float(state.winch_tensions[place])
-                self._winches[place], self._commands = winch.locked(time, tension), None
+                self._winches[place] = winch.locked(time, tension)
+        self._tell()
 
     def driving(self, time: float, state: ChainState) -> bool:
         """Whether any winch turns or will turn on a rope that is whole."""

@@ -152,7 +152,7 @@ class Meters:
         """What outputs read of an instant in this state, with its ropes and the model's cables."""
         self.now = now
         planes = () if cables is None else tuple((plane,) for plane, _ in cables.present)
-        told = None if cables is None else cables.winches.commands()
+        told = None if cables is None else cables.winches.commands
         return Reading(**vars(now), meters=self, chain=chain, planes=planes, commands=told)
 
     @cached_property
