@@ -29,7 +29,7 @@ from ringsim.outputs.balance import instead_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted, unit_text, with_unit
-from ringsim.units import Model, UnitOf
+from ringsim.units import Model, UnitOf, in_unit
 from ringsim.variables import Fate
 
 if TYPE_CHECKING:
@@ -233,9 +233,7 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
         if (many := bool(name in VARIABLES and VARIABLES[name].dims)) or place:
             cure = instead_of(name) if many else f"a sample has one value: leave out {place}"
             raise InputError(f"--require {name}{place or ''}: {cure}")
-        for part in parts:
-            _require_unit(name, part[1], part[2], part[3])  # type: ignore[index]
-        table[name] = {part[1]: _value(part[2]) for part in parts if part}
+        table[name] = {part[1]: _told(name, part[1], part[2], part[3]) for part in parts if part}
     return read_requirements(table, "--require")
 
 
@@ -243,18 +241,22 @@ _HEAD = r"\s*(\w*)(\[[^\]]*\])?\s*([:=]?)(.*)"
 """The name of an output, perhaps a place in it, and what is required."""
 _BOUND = r"(\w+)(?:\s*=\s*|\s+)(\S+)(?:\s+(\S.*))?"
 """A key, its value, and for a bound perhaps its unit."""
-_SHORT = {"deg": "degree", "degrees": "degree"}
 
 
-def _require_unit(name: str, key: str, value: str, unit: str | None) -> None:
-    """Refuse (InputError) a unit behind a bound that is not the output's: nothing is converted."""
+def _told(name: str, key: str, word: str, unit: str | None) -> Any:
+    """A value in the output's unit, from one in any unit of its kind; InputError for another."""
+    value = _value(word)
     if unit is None or name not in quantities():
-        return
+        return value
     own, unit = quantities()[name].units, " ".join(unit.split())
-    if key not in ("max", "min") or _SHORT.get(unit, unit) != own:
-        cure = f"in {own}" if unit_text(own) else "as a number without a unit"
-        cure = cure if key in ("max", "min") else "without a unit"
-        raise InputError(f"--require {name}: {key} = {value} {unit}: give it {cure}")
+    written, wanted = (re.sub(r"\bdegrees?\b", "deg", each) for each in (unit, own))
+    if key in ("max", "min") and isinstance(value, float):
+        found = value if written == wanted else in_unit(value, written, wanted)
+        if found is not None:
+            return found
+    cure = f"in {own}" if unit_text(own) else "as a number without a unit"
+    cure = cure if key in ("max", "min") else "without a unit"
+    raise InputError(f"--require {name}: {key} = {word} {unit}: give it {cure}")
 
 
 def _value(word: str) -> Any:

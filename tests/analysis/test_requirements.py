@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from loops import for_each
@@ -83,12 +85,29 @@ def test_wrong_requirements_are_told_with_the_cure(table, words):
         (["latch_rate[upper,2]: max 3"], r"latch_rate\[upper,2\]: .*its largest, peak_latch_rate"),
         (["latch_rate: min 0.1"], "require latch_rate: .*its least, least_latch_rate"),
         (["peak_tension[1]: max 3"], r"peak_tension\[1\]: a sample has one value: leave out \[1\]"),
-        (["asynchrony_max: max 10 rad, probability 0.9"], "max = 10 rad: give it in deg"),
+        (["asynchrony_max: max 10 N, probability 0.9"], "max = 10 N: give it in deg"),
+        (["asynchrony_max: max 1, probability 9 %"], "probability = 9 %: give it without"),
+        (["locked_joints: min 3 s, probability 0.9"], "min = 3 s: give it as a number without"),
     ],
 )
 def test_wrong_texts_are_told_with_an_example(texts, words):
     with pytest.raises(InputError, match=words):
         parse_requirements(texts)
+
+
+@for_each(
+    ("text", "bound"),
+    [
+        ("peak_rod_stress: max 5 MPa", 5e6),
+        ("peak_tension: max 0.1 kN", 100.0),
+        ("deployment_time: max 2 min", 120.0),
+        ("asynchrony_max: max 0.1 rad", math.degrees(0.1)),
+        ("least_latch_rate: min 3 deg/s", math.radians(3.0)),
+    ],
+)
+def test_bounds_in_other_units_are_taken_over(text, bound):
+    (found,) = parse_requirements([f"{text}, probability 0.99, confidence 0.9"]).values()
+    assert (found.max if found.min is None else found.min) == pytest.approx(bound, rel=1e-12)
 
 
 def test_degrees_have_three_names():
