@@ -227,7 +227,7 @@ class FrameCables:
         if self.winches.answering:
             call("measure", self.roped.ropes, places, rates, self.roped.spans)
             self.winches.answer_in(lambda function: call("answer_ropes", self.roped, function))
-            self._turned = _Turned(*self.roped.winches.turned.copy())
+            self._take_answers()
         return self._tightened(places, rates)
 
     def _tightened(self, places: Array, rates: Array) -> ChainState:
@@ -242,9 +242,12 @@ class FrameCables:
 
     def balanced(self) -> ChainState:
         """The chain as Newton's last residual of a step has left it."""
+        self._take_answers()
+        return self._read()
+
+    def _take_answers(self) -> None:
         if self.winches.answering:
             self._turned = _Turned(*self.roped.winches.turned.copy())
-        return self._read()
 
     def _read(self) -> ChainState:
         roped, log_decays = self.roped, self.laws.decays.rows[_DECAY]
@@ -278,7 +281,8 @@ class FrameCables:
         self.winches.advance(time, state, slopes, self.ropes, self.roped.ropes)
 
     def refuse(self, places: Array, rates: Array) -> None:
-        """ValueError, with what is wrong, where the chain has no answer."""
+        """ValueError, with what is wrong, where Newton's last residual has no chain."""
+        self._take_answers()
         self.chain.state(self.ropes, places, rates, *self._turned)
 
     def turn(self, time: float) -> None:

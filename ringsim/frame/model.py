@@ -271,8 +271,9 @@ class FrameModel:
             f"step {step:.3g} s",
             _ENDLESS: "forces or places are no finite numbers, as of a law outside of its domain",
             _SMALL_PIVOT: "a pivot of the tangent is too small",
+            _NO_TENSIONS: why or "no tensions of the ropes go with their lengths",
         }
-        return Balanced(iterations, tangents, words.get(how, why))
+        return Balanced(iterations, tangents, words[how])
 
     def core(self, name: str, time: float, step: float, now: State, *given: Any) -> int:
         """Call a function of newton.c for a state at a time (s), a step (s) after another one;

@@ -436,8 +436,9 @@ class Draft:
         if isinstance(part, BodyRef):
             pose = self.bodies[part.number].pose
             arm = place - pose.place
-            there, moving = place, pose.rate + cross(pose.turn.tolist(), arm.tolist())
             mount = OnBody(part.number, pose.axes.T @ arm, pose.axes.T @ axes)
+            there = pose.place + pose.axes @ mount.arm
+            moving = pose.rate + cross(pose.turn.tolist(), arm.tolist())
         else:
             rod = self.rods[part.number]
             size = max(rod.length, 1.0)

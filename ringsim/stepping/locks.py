@@ -104,7 +104,7 @@ class Locks(Remembering):
         that and this step goes on for long behind it; or one that leads towards a latch of which
         this one leaves open whether it catches; else None.  None is below ``least`` (s).
         """
-        if found.angles.max() < math.pi:
+        if not found.angles.max() >= math.pi:
             return None
         step, wanted = found.time - before.time, list[float]()
         for row in self._acted_on:

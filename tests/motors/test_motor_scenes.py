@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -369,3 +371,16 @@ def test_motors_at_both_ends_of_a_rope_share_what_they_wind(fidelity: str) -> No
     known = np.isfinite(first)
     assert known.sum() > 20
     np.testing.assert_allclose(first[known], second[known], rtol=1e-5, atol=1e-3)
+
+
+def test_a_motor_winds_up_a_free_rope_to_its_end_and_no_farther() -> None:
+    """Newton finds no tensions of a rope that has gone: such a step is taken again with half of it,
+    until what is left is less than any step winds."""
+    cuts = [{"kind": "cut-cable", "cable": k, "span": 1, "time": 1.0} for k in (1, 2)]
+    values = {
+        "structure.sections": 4, "faults": cuts, "solver.restarts": 0, "solver.end_time": 500.0
+    }  # fmt: skip
+    found = simulate(load_scene("ring18-motor").with_values(values), "frame")
+    over = re.search(r"cable 1: (\S+) m more is wound than there is rope", found.attrs["reason"])
+    assert over is not None
+    assert float(over[1]) < 1e-8

@@ -270,7 +270,7 @@ void take_rows(const D *rows, I count, I size, const D *columns, I n, D *corner)
             I begin = 0, end = size;
             while (begin < end && own[r][begin] == 0.0) begin++;
             while (begin < end && own[r][end - 1] == 0.0) end--;
-            first = begin < first ? begin : first, last = end > last ? end : last;
+            if (begin < end) first = begin < first ? begin : first, last = end > last ? end : last;
         }
         for (I j = 0; j < n; j += EIGHT) {
             D *to = corner + i * n + j;
