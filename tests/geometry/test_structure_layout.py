@@ -153,9 +153,27 @@ class Parting(Structure):
         return draft.finish()
 
 
+class Skewed(Structure):
+    """Its body's axes are no unit vectors."""
+
+    kind: Literal["skewed"] = "skewed"
+
+    def layout(self, scene: Any, coordinate: Any) -> Layout:
+        draft = Draft(scene)
+        lump = Lump("mass", 1.0, np.zeros(3), np.eye(3))
+        one = draft.body(np.zeros(3), [lump])
+        other = draft.body(np.zeros(3), [lump], 2.0 * np.eye(3))
+        draft.joint("revolute", "hinge", 0, (one, other), np.array([1.0, 0.0, 0.0]))
+        return draft.finish()
+
+
 @pytest.mark.parametrize(
     ("structure", "wanted"),
-    [(Stretching(), "rod of section 1 changes its length"), (Parting(), "a hinge is 1 m away")],
+    [
+        (Stretching(), "rod of section 1 changes its length"),
+        (Parting(), "a hinge is 1 m away"),
+        (Skewed(), "a hinge is 3 m away"),
+    ],
 )
 def test_a_structure_that_cannot_be_is_refused(structure: Structure, wanted: str) -> None:
     plain = load_scene("ring18").with_values(
