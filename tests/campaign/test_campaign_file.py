@@ -294,6 +294,16 @@ def test_samples_with_error_bars_cost_more_and_are_no_trial(tmp_path):
     assert extent_told(bars) == "  error bars     samples 0, 4"
 
 
+@pytest.mark.quick
+def test_inputs_of_several_paths_are_told_by_both_names(tmp_path):
+    paths = [f"joints.{family}.viscous" for family in ("hinge", "pivot")]
+    shared = f'[inputs.drag]\nkind = "uniform"\nlow = 1e-4\nhigh = 8e-4\nshared = {paths}\n'
+    campaign = loaded(tmp_path, GOOD + shared.replace("'", '"'))
+    lines = [extent_told(column) for column in campaign.draw().columns if column.input == "drag"]
+    assert [line.partition(":")[0] for line in lines] == [f"  drag, {path}" for path in paths]
+    assert lines[0].endswith(" N m s/rad")
+
+
 @pytest.mark.skipif(shutil.which("ncdump") is None, reason="there is no ncdump")
 def test_file_opens_in_ncdump(bench):
     bench.run("campaign", bench.write(2), "--workers", 0, "--out", "out")
