@@ -165,7 +165,7 @@ def bound_of_first_levels(found: list[Repetition], response: float) -> float:
 def _event(design: SubsetSimulation, response: float, units: str) -> str:
     """That the output is beyond a response, in words."""
     sign = ">" if design.sign > 0 else "<"
-    return f"{design.of} {sign} {with_unit(f'{design.sign * response:.6g}', units)}"
+    return f"{design.of} {sign} {with_unit(f'{design.sign * response + 0.0:.6g}', units)}"
 
 
 def _short(
@@ -180,7 +180,9 @@ def _short(
     each, chains = np.array([one.beyond(min(ends)) for one in found]).T
     unled = bound_of_first_levels(found, min(ends))
     ends_of_interval, _ = replicated_interval(each, chains, unled)
-    if any(one.probability > 0.0 for one in found):  # by a way that the others did not find
+    if not (each > 0.0).all():  # the best of some first level are equal
+        ends_of_interval = np.array([0.0, unled])
+    elif any(one.probability > 0.0 for one in found):  # by a way that the others did not find
         ends_of_interval[1] = unled
     event = _event(design, min(ends), units)
     nearest = design.sign * float(np.max(known, where=np.isfinite(known), initial=-np.inf))
@@ -204,14 +206,15 @@ def _checks(
     """What the runs repeated with the full engine say, and the probability with the limit moved by
     what the engines differ at most: nearer, and farther.
     """
-    inside, both = (known > design.target) & good(campaign), np.zeros(len(known), dtype=bool)
-    again, apart = both, 0.0
+    held, both = good(campaign), np.zeros(len(known), dtype=bool)
+    inside, again, apart = (known > design.target) & held, both, 0.0
     if f"{design.of}{CHECKED}" in campaign:
-        both = (campaign[f"status{CHECKED}"].to_numpy() == Status.OK) & good(campaign)
+        # Also of failed runs, which count as outside the event.
+        both = campaign[f"status{CHECKED}"].to_numpy() == Status.OK
         values = campaign[f"{design.of}{CHECKED}"].to_numpy().astype(float)
         full = design.responses(values, ~both)
-        again, pairs = full > design.target, both & np.isfinite(full) & np.isfinite(known)
-        apart = float(np.max(np.abs(full - known), where=pairs, initial=0.0))
+        again, pairs = full > design.target, both & held & np.isfinite(full) & np.isfinite(known)
+        apart = float(np.max(np.abs(full[pairs] - known[pairs]), initial=0.0))
     moved = [
         float(np.mean([one.beyond(design.target + step)[0] for one in found]))
         for step in (apart, -apart)
@@ -256,10 +259,15 @@ def short_of(found: xr.Dataset) -> list[str]:
     words = [f"below {most}: {short} of {len(each)} replicates did not reach the event"]
     if short < len(each):
         words.append(f"the mean of all {len(each)} estimates is {each.mean():.2g}")
+    told = f"the bound is the probability of {reached.attrs['event']}"
+    if low > 0.0:
+        told += f", which all replicates reached: {float(reached):.3g} (95 % "
+        told += f"{bound_text(low, 2, upper=False)} .. {most})"
+    else:
+        told += f" by the first {int(found['tail_unled_samples'])} samples, which are independent"
     return [
         *words,
-        f"the bound is the probability of {reached.attrs['event']}, which all replicates "
-        f"reached: {float(reached):.3g} (95 % {bound_text(low, 2, upper=False)} .. {most})",
+        told,
         "the run nearest to the event has "
         f"{with_unit(f'{float(nearest):.6g}', nearest.attrs['units'])}",
     ]
@@ -326,7 +334,7 @@ def tail_table(analysis: xr.Dataset) -> Table:
         rows.append((
             "in the event with the full engine only",
             f"{int(analysis['tail_missed'])} of {outside} repeated runs outside the event (the "
-            "nearest ones, and those that ended before the antenna was deployed)",
+            "nearest ones, those that ended before the antenna was deployed, and failed ones)",
         ))  # fmt: skip
     if (checked or outside) and not why:
         apart = analysis["tail_difference"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from scipy.stats import norm
 
@@ -11,6 +12,7 @@ from ringsim.analysis.study_text import sections, told
 from ringsim.analysis.tails import tail_table
 from ringsim.plots.campaign.tornado import explained
 from ringsim.sampling.designs.levels import SubsetSimulation
+from ringsim.variables import Status
 
 pytestmark = pytest.mark.quick
 
@@ -22,15 +24,17 @@ def linear(points):
     return norm.ppf(points).sum(axis=1) / 2**0.5
 
 
-def campaign(above, most_levels):
-    """A campaign that has grown as far as its levels go."""
+def campaign(above, most_levels, lost=None):
+    """A campaign that has grown as far as its levels go; ``lost`` takes its points."""
     design = SubsetSimulation(
         of="asynchrony_max", above=above, samples=100, share=0.1, replicates=4,
         most_levels=most_levels,
     )  # fmt: skip
     while not design.ended:
-        design = design.knowing(linear(design.points(FACTORS, 3)))
-    made = drawn_campaign(design, linear, 2, 3)
+        points = design.points(FACTORS, 3)
+        gone = np.zeros(len(points), dtype=bool) if lost is None else lost(points)
+        design = design.knowing(design.responses(linear(points), gone))
+    made = drawn_campaign(design, linear, 2, 3, lost)
     made["asynchrony_max"].attrs["units"] = "degree"
     return made
 
@@ -53,6 +57,46 @@ def test_an_event_that_is_not_reached_is_bounded_and_never_told_as_zero(above, s
         f"the run nearest to the event has {made.asynchrony_max.values.max():.6g} deg"
     ) in table.notes
     assert {*table.notes, table.lines()[0]} <= {*told(found)}
+
+
+def test_of_equal_responses_the_first_samples_bound_the_event():
+    """As of rings none of which is ever slack."""
+    design = SubsetSimulation(
+        of="longest_slack", above=0.2, samples=100, share=0.1, replicates=4, most_levels=3
+    )
+
+    def never(points):
+        return np.zeros(len(points))
+
+    while not design.ended:
+        design = design.knowing(never(design.points(FACTORS, 3)))
+    made = drawn_campaign(design, never, 2, 3)
+    made = made.rename(asynchrony_max="longest_slack")
+    made["longest_slack"].attrs["units"] = "s"
+    table = tail_table(analyse(made))
+    assert made.sizes["sample"] == 400
+    assert dict(table.rows)["probability"] == (
+        "below 0.0092: 4 of 4 replicates did not reach the event"  # 1 - 0.025^(1 / 400)
+    )
+    assert (
+        "the bound is the probability of longest_slack > 0 s by the first 400 samples, which are "
+        "independent"
+    ) in table.notes
+
+
+def test_failed_runs_that_the_full_engine_finds_in_the_event_are_told():
+    def lost(points):
+        return points[:, 0] < 0.05
+
+    made = campaign(2.5, 8, lost)
+    gone = made["status"].values == Status.DIVERGED
+    made["status_checked"] = "sample", np.where(gone, 0, -1)
+    again = np.where(gone, 99.0, np.nan)
+    made["asynchrony_max_checked"] = "sample", again, made.asynchrony_max.attrs
+    rows, count = dict(tail_table(analyse(made)).rows), int(gone.sum())
+    assert count > 10
+    told_of = rows["in the event with the full engine only"]
+    assert told_of.startswith(f"{count} of {count} repeated runs outside the event")
 
 
 def test_an_event_that_all_reached_has_its_probability():

@@ -90,8 +90,26 @@ def test_small_levels_tell_too_little_of_two_sides_as_a_rule_and_the_mean_is_exa
     assert ((ends[:, 0] <= exact) & (exact <= ends[:, 1])).mean() >= 0.92
 
 
-def test_equal_responses_at_a_threshold_go_on_together():
-    """A response of a few values only: 3 with probability 1e-3, 2 with 0.02, 1 with 0.2."""
+def test_the_mean_is_exact_where_most_responses_are_equal():
+    """As longest slacks are, of rings that are never slack: what goes on below equal ones until
+    something lies beyond them has five times the probability.
+    """
+    rng, truth = np.random.default_rng(7), norm.sf(3.2)
+    for samples, many in ((100, 300), (500, 80)):
+        found = [
+            simulated(
+                lambda points: np.maximum(points[:, 0] - 3.0, 0.0), rng,
+                target=0.2, samples=samples, axes=1,
+            )
+            for _ in range(many)
+        ]  # fmt: skip
+        each = np.array([one.probability for one in found])
+        assert abs(each.mean() - truth) < 3.0 * each.std() / many**0.5
+        assert (each == 0.0).any()
+
+
+def test_responses_of_few_values_have_an_exact_mean_too():
+    """3 with probability 1e-3, 2 with 0.02, 1 with 0.2."""
     limits = norm.isf([0.2, 0.02, 1e-3])
     rng = np.random.default_rng(1)
     found = [

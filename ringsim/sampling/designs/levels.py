@@ -155,7 +155,7 @@ def simulation_of(
     length = round(1.0 / share)
     chains = found.chains = samples // length
     here, response = yield Batch(np.full(samples, -1), 1.0, 0)
-    probability, squares, anew, before = 1.0, 0.0, _FIRST, -np.inf
+    probability, squares, anew = 1.0, 0.0, _FIRST
     for level in range(most + 1):
         found.states.append(response)
         # The highest response outside the share, and those that equal it stay outside.  With the
@@ -163,12 +163,12 @@ def simulation_of(
         bound = float(np.sort(response)[-chains - 1])
         beyond = response > target
         last = beyond.sum() > chains or level == most
-        inside = beyond if last else response > bound
         if not last and bound == -np.inf:
             return  # too few samples tell anything
-        if not last and not inside.any():  # all of the best are equal: they go on together
-            bound = float(np.max(response, where=response < bound, initial=before))
-            inside = response > bound
+        # Where all of the best are equal nothing lies beyond, and the estimate is 0 (Brehier 2016):
+        # to go on below until something does would count every attempt.
+        last = last or not (response > bound).any()
+        inside = beyond if last else response > bound
         probability *= float(inside.mean())
         squares += variance_of_level(inside, chains if level else samples)
         if last:
@@ -177,7 +177,6 @@ def simulation_of(
         found.thresholds.append(bound)
         found.shares.append(probability)
         found.squares.append(squares)
-        before = bound
         seeds = np.resize(np.flatnonzero(inside), chains)
         states, values = here[seeds], response[seeds]
         course, heights = [states], [values]
