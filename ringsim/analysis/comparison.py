@@ -3,7 +3,7 @@
 import tomllib
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -421,6 +421,8 @@ def samples_of(first: xr.Dataset, second: xr.Dataset) -> tuple[Both, Pairs]:
         ran.append(each.isel(sample=over) if len(over) else each)
     pairs = paired(ran[0], ran[1])
     if not len(pairs.first):
+        if len(paired(first, second).first):
+            pairs = replace(pairs, told="samples are not paired: of no pair both have run")
         return (ran[0], ran[1]), pairs
     order = np.sort(pairs.second)
     both = ran[0].isel(sample=pairs.first), ran[1].isel(sample=order)
@@ -536,9 +538,10 @@ def _output(
                 p.replicate_of(i[k]) for p, i, k in zip(placed, index, there, strict=True)
             )
             ends = intervals.of_difference(used[0], used[1], which)
+    alone = False
     if not all(map(len, used)):  # one of them may have none, as of a ring that stays closed
         used = [each[np.isfinite(each)] for each in values]
-        ends = intervals.NONE
+        ends, alone = intervals.NONE, len(pairs.first) > 0 and all(map(len, used))
     if not any(map(len, used)):
         return {}
     means = np.array([each.mean() if len(each) else np.nan for each in used])
@@ -546,7 +549,8 @@ def _output(
         means = means * np.nan
     rows: dict[str, tuple[Any, Any, str]] = {
         "mean": ("side", means, "mean of the samples compared"),
-        "difference": ((), means[1] - means[0], "second minus first"),
+        # No pair has both values: those of one side are of other antennas than of the other.
+        "difference": ((), np.nan if alone else means[1] - means[0], "second minus first"),
         "difference_interval": ("bound", np.array(ends), "interval of 95 % of the difference"),
         "samples": ("side", np.array([len(each) for each in used]), "samples compared"),
     }

@@ -374,7 +374,8 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
         first, second = factor * first, factor * second
         apart = factor * found[f"{name}_difference"].item()
         low, high = factor * found[f"{name}_difference_interval"].values
-        if not all(counts):  # that one has none, and how many the other has
+        # That one has none, and how many the other has; or that of no pair both have one.
+        if not all(counts) or (np.isnan(apart) and np.isfinite([first, second]).all()):
             each = zip((first, second), counts, strict=True)
             cells = [number_text(value) if count else "none" for value, count in each]
             used = " and ".join(map(str, counts))

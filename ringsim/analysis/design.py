@@ -23,7 +23,7 @@ from ringsim.choice import kind_of, kinds_of
 from ringsim.files import DESIGN, MERGED, campaign_cure
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
-from ringsim.sampling.columns import BLOCK_ROW
+from ringsim.sampling.columns import BLOCK_ROW, partners
 from ringsim.sampling.designs import Design
 from ringsim.sampling.designs.blocks import Grouped, stretches
 from ringsim.stepping.instant import Array
@@ -356,6 +356,13 @@ def by_path(campaign: xr.Dataset) -> dict[str, str]:
 def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
     """The tables of the campaign's file, which the dataset keeps as text."""
     return tomllib.loads(str(campaign.attrs.get("campaign", "")))
+
+
+def correlated(campaign: xr.Dataset) -> dict[str, str]:
+    """By input another one that it is correlated with."""
+    drawn = [called(campaign[name]) for name in inputs(campaign)]
+    scene = tomllib.loads(str(campaign.attrs.get("scene", "")))
+    return partners(campaign_file(campaign).get("correlations", []), scene, drawn)
 
 
 def distribution_of(variable: xr.DataArray) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from ringsim.analysis.design import (
     LOST,
     Placement,
     called,
+    correlated,
     endings,
     inputs,
     kinds_of_ends,
@@ -36,7 +37,6 @@ from ringsim.analysis.intervals import (
 )
 from ringsim.analysis.requirements import OUTCOME, Requirement, rule_of, violations
 from ringsim.analysis.verdicts import Verdict, verdict_of
-from ringsim.files import parse_toml
 from ringsim.overrides import parse_value
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.distributions import (
@@ -389,14 +389,11 @@ def _drawn_from(campaign: xr.Dataset, path: str, variable: xr.DataArray) -> Dist
             "inputs, and a new distribution of one input alone would not keep that: run a new "
             "campaign"
         )
-    text = parse_toml(str(campaign.attrs.get("campaign", "")), "campaign")
-    for pair in text.get("correlations", []):
-        if path in (names := pair.get("between", [])):
-            raise InputError(
-                f"--reweight {path}: it is correlated with "
-                f"{next((name for name in names if name != path), path)}, and a new distribution "
-                "of one input alone would not keep the correlation: run a new campaign"
-            )
+    if other := correlated(campaign).get(path):
+        raise InputError(
+            f"--reweight {path}: it is correlated with {other}, and a new distribution of one "
+            "input alone would not keep the correlation: run a new campaign"
+        )
     return old
 
 
@@ -476,15 +473,18 @@ def reweight(
             (), effective(weights[known]), about("effective samples"),
         )  # fmt: skip
     cap, shares, words = None, list[tuple[float, ...]](), list[str]()
+    by = placed.replicate_of(index[run])
     for word, (own, of) in _events(campaign, requirements, ok, gone).items():
         share, ends = mean(own[of].astype(float), weights[of]), NONE
         decisive = decisive_of_share(own[of], weights[of])
+        # What failed runs would have done nobody knows: from none of them to all.
+        both = own[run], (own | gone)[run]
         if has_share_intervals(placed) and decisive >= LEAST_OF_SHARE:
-            ends = share_interval(own[of], weights[of], placed.replicate_of(index[of]))
+            told_of = (share_interval(each, weights[run], by) for each in both)
+            ends = tuple(each[side] for side, each in enumerate(told_of))
         elif has_share_intervals(placed):
             cap = cap or Cap(pairs, int(run.sum()), (1 - LEVEL) / 2)
-            apart = own[run], (of & ~own)[run]
-            ends = _rarer(cap, *apart, weights[run], placed.replicate_of(index[run]))
+            ends = _rarer(cap, both[0], ~both[1], weights[run], by)
         words.append(word)
         shares.append((share, *ends, decisive))
     told = np.array(shares).reshape(-1, 4)
@@ -586,12 +586,13 @@ def _told(
 def _events(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement], ok: Mask, gone: Mask
 ) -> dict[str, tuple[Mask, Mask]]:
-    """What may happen to a sample: which samples it happened to, of which."""
+    """What may happen to a sample: which samples it happened to, of which: all that ran, and of
+    requirements, as their verdicts have it, those whose numbers hold."""
     found: dict[str, tuple[Mask, Mask]] = {}
     if OUTCOME in campaign and ok.any():
         words = endings(campaign)
         kinds = [word for word in kinds_of_ends(words) if not word.startswith(LOST)]
-        found = {word: (words == word, ok) for word in kinds}
+        found = {word: (words == word, ok | gone) for word in kinds}
     if gone.any():
         found[FAILED_RUNS] = gone, ok | gone
     for name, each in requirements.items() if ok.any() else ():

@@ -20,7 +20,7 @@ from ringsim.analysis.design import (
     Placement,
     blocks_of,
     called,
-    campaign_file,
+    correlated,
     distribution_of,
     drawn,
     inputs,
@@ -355,8 +355,7 @@ def changes(campaign: xr.Dataset, step: float = STEP) -> tuple[list[Change], dic
     """The distribution of each input with one parameter changed by ``step``, and what samples do
     not tell, by the reason.
     """
-    pairs = campaign_file(campaign).get("correlations", [])
-    correlated = {name for pair in pairs for name in pair["between"]}
+    tied = correlated(campaign)
     found, left = list[Change](), dict[str, list[str]]()
     for variable in (campaign[name] for name in inputs(campaign)):
         name, units = called(variable), str(variable.attrs.get("units", "1"))
@@ -369,7 +368,7 @@ def changes(campaign: xr.Dataset, step: float = STEP) -> tuple[list[Change], dic
             continue
         if variable.dtype.kind not in "iuf" and not isinstance(law, Discrete):
             continue  # words have no density
-        if name in correlated:
+        if name in tied:
             left.setdefault("correlated with another input", []).append(name)
             continue
         places, count = "", len(found)
@@ -437,7 +436,8 @@ def ratio_of(
     scaled, count = weights / weights.mean(), len(own)
     found, two = float(scaled[own].mean()), np.unique(weights.round(9))
     if len(two) == 2:
-        low, high = two / weights.mean()
+        # Undivided: their mean over all samples is uncertain, what it is of is 1.
+        (low, high), found = two, float(weights[own].mean())
         upper = int(np.sum(weights[own] > two.mean()))
         shares = [share_bounds(upper, int(own.sum()), 1.0 - each / 2) for each in errors]
         return found, [(low + (high - low) * a, low + (high - low) * b) for a, b in shares]

@@ -71,8 +71,9 @@ class _Oddity(NamedTuple):
 
 
 def unusual(
-    campaign: xr.Dataset, places: Sequence[int], separating: Sequence[Mapping[str, bool]] = ()
-) -> list[str]:
+    campaign: xr.Dataset, places: Sequence[int], separating: Sequence[Mapping[str, bool]] = (),
+    whole: xr.Dataset | None = None,
+) -> list[str]:  # fmt: skip
     """For samples, by their places, the inputs that tell them from the others, at most three:
     "cold: temperature 235 K (-38 C, the lowest); mean of pulleys 8.3e-4 m (+50 %)".
 
@@ -82,12 +83,12 @@ def unusual(
 
     Of an input with m places the one that is farthest out among all values counts, with m times
     the share: some place of every sample is far out by chance.  Its mean counts beside, and large
-    differences of the two planes' inputs.
-    Of a design that changes one input at a time what is other than in its base case; of a list of
-    cases first their labels, and what most of them have otherwise.  A drawn fault is always told.
+    differences of the two planes' inputs.  Of a design that changes one input at a time what is
+    other than in its base case, the first of the ``whole`` campaign; of a list of cases first their
+    labels, and what most of them have otherwise.  A drawn fault is always told.
     """
     if one_at_a_time(campaign):
-        return [other_than_base(campaign, place) for place in places]
+        return [other_than_base(campaign, place, whole) for place in places]
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
     listed, grid = (placement(campaign).kind == kind for kind in ("list", "grid"))
@@ -177,15 +178,16 @@ def one_at_a_time(campaign: xr.Dataset) -> bool:
     return bool(placement(campaign).kind == "one-at-a-time")
 
 
-def other_than_base(campaign: xr.Dataset, place: int) -> str:
-    """What a sample, by its place in the file, has other than the first one: "cables.lower.winch.
-    stop_time = 1 s (base: none)".
+def other_than_base(campaign: xr.Dataset, place: int, whole: xr.Dataset | None = None) -> str:
+    """What a sample, by its place in the file, has other than the first one of the whole campaign:
+    "cables.lower.winch.stop_time = 1 s (base: none)".
     """
     told = []
-    for variable in (campaign[name] for name in inputs(campaign)):
-        for of, column in _columns(variable):
-            if column[place] != column[0]:
-                new, base = (_value(column[row], _units(variable)) for row in (place, 0))
+    for name in inputs(campaign):
+        variable, first = campaign[name], _columns((campaign if whole is None else whole)[name])
+        for (of, column), (_, bases) in zip(_columns(variable), first, strict=True):
+            if column[place] != bases[0]:
+                new, base = (_value(each, _units(variable)) for each in (column[place], bases[0]))
                 told.append(f"{of}{called(variable)} = {new} (base: {base})")
     return "; ".join(told[:_MOST]) or "the base case"
 
@@ -305,7 +307,7 @@ def worst(
     for name, wanted in requirements.items():
         require_values(campaign, name, wanted)
     # What has not run yet is no sample of which others are told.
-    campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
+    whole, campaign = campaign, campaign.isel(sample=np.flatnonzero(ran(campaign)))
     rows, chosen = list[tuple[str, int, int, str]](), list[int]()
     sides, every = list[dict[str, bool]](), _sides(analysis)
     wider = list[tuple[Mask, dict[str, bool]]]()
@@ -332,7 +334,7 @@ def worst(
         "of": (np.array(of), about("samples that have run")),
         "sample": (campaign["sample"].to_numpy()[chosen], about("one of the worst of these")),
         "found": (np.array(found, dtype=object), {"long_name": "its value, or why the run ended"}),
-        "inputs": (np.array(unusual(campaign, chosen, sides), dtype=object),
+        "inputs": (np.array(unusual(campaign, chosen, sides, whole), dtype=object),
                    {"long_name": "its unusual inputs"}),
     }  # fmt: skip
     return xr.Dataset({f"worst_{name}": ("worst", *each) for name, each in columns.items()})
@@ -362,9 +364,8 @@ def _of_output(
     """The inputs that go with the output which fails beyond chance, the strongest first, and
     whether larger ones make it worse: where nearly all samples fail nothing separates these.
     """
-    if analysis is None or failure.larger is None:
-        return {}
-    if f"{failure.value}_rank_correlation" not in analysis:
+    goes_with = f"{failure.value}_rank_correlation"
+    if analysis is None or failure.larger is None or goes_with not in analysis:
         return {}
     samples = int(np.isfinite(numbers(campaign, failure.value)[good(campaign)]).sum())
     values, listed = standing_out(analysis, failure.value, samples)
@@ -373,9 +374,7 @@ def _of_output(
     return {str(names[k]): (values[k] > 0.0) == failure.larger for k in order if listed[k]}
 
 
-def _failures(
-    campaign: xr.Dataset, requirements: Mapping[str, Requirement]
-) -> list[_Failure]:  # fmt: skip
+def _failures(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> list[_Failure]:
     """All failures that happened; those of the same samples as one, with the words of both."""
     stuck, found = _stuck(campaign), []
     for name, wanted in requirements.items():
@@ -520,7 +519,7 @@ def margins(campaign: xr.Dataset, plane: str = "") -> xr.Dataset:
             told = f"{path} = {ends} (drawn, {bound:.4g} in sample {int(campaign['sample'][k])})"
         later = series and exceeded(numbers(campaign, peak)[k], values[k])
         of = f"{series} after the last lock, as recorded" if later else peak
-        known = good(campaign) & np.isfinite(values)  # ropes that never were slack have 0 s of it
+        known = good(campaign) & np.isfinite(values + allowed)  # ropes never slack have 0 s of it
         counts = int((known & (values > allowed)).sum()), int(known.sum())
         rows.append((told, peak, of, float(ratio[k]), float(values[k]), k, *counts))
     late = [f"{_DRIVE}_started"] * bool(late_line(campaign))
@@ -529,8 +528,7 @@ def margins(campaign: xr.Dataset, plane: str = "") -> xr.Dataset:
         if np.isfinite(least).any():
             k = int(np.nanargmin(least))
             counts = int((least < 0.0).sum()), int(np.isfinite(least).sum())
-            same = float(least[k])
-            rows.append((f"{name} >= 0", name, name, same, same, k, *counts))
+            rows.append((f"{name} >= 0", name, name, *2 * [float(least[k])], k, *counts))
     if not rows:
         return xr.Dataset()
     texts, names, told_of, margin, value, places, beyond, of_all = zip(*rows, strict=True)
@@ -557,10 +555,15 @@ def _ratios(campaign: xr.Dataset) -> Iterator[tuple[str, str, str, Any, Array, A
         path = f"limits.{limit}"
         if peak not in campaign or (path not in scene and path not in own):
             continue
-        allowed = numbers(campaign, own[path]) if path in own else float(scene[path])
+        allowed: Any = (
+            float(scene[path])
+            if path not in own
+            else np.array(
+                [np.nan if v == "none" else float(v) for v in campaign[own[path]].values.tolist()]
+            )
+        )
         values = largest(campaign, peak, series)
-        loaded = np.where(good(campaign) & (values > 0.0), values, np.nan)
-        ratio = np.asarray(allowed / loaded - 1.0)
+        ratio = np.asarray(allowed / np.where(good(campaign) & (values > 0), values, np.nan) - 1.0)
         if np.isfinite(ratio).any():
             yield path, peak, series, allowed, values, ratio
 

@@ -3,7 +3,9 @@
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import permutations
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ringsim.cable.records import CABLES
+from ringsim.overrides import with_number
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.distributions import (
     Array,
@@ -247,6 +250,29 @@ def pairs_of(
             )
         for one, other in zip(first, second, strict=True):
             yield pair, one, other
+
+
+def partners(
+    pairs: Sequence[Mapping[str, Any]], scene: dict[str, Any], drawn: Sequence[str]
+) -> dict[str, str]:
+    """By drawn input the other one of the first of a file's correlations in which it has a part,
+    by itself, as a place of another one, or with a place that is drawn with it.
+    """
+
+    def own(name: str) -> str:
+        with suppress(InputError):
+            return with_number(scene, name)
+        return name
+
+    found, known = dict[str, str](), {own(name) for name in drawn}
+    for pair in pairs:
+        for one, other in permutations(pair["between"]):
+            place = own(one)
+            for name in drawn:
+                with_place = place.startswith(f"{own(name)}[") and place not in known
+                if own(name) == place or own(name).startswith(f"{place}[") or with_place:
+                    found.setdefault(name, other)
+    return found
 
 
 def _axes(paths: Sequence[str], name: str) -> list[int]:

@@ -9,6 +9,7 @@ from made_campaign import made_campaign
 
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import case_table, told
+from ringsim.analysis.worst import worst_lines
 from ringsim.plots.campaign.frame import looks_of_cases
 
 pytestmark = pytest.mark.quick
@@ -80,3 +81,19 @@ def test_cases_of_a_list_are_told_by_their_names(campaign: xr.Dataset) -> None:
     assert [row for row in told(analyse(listed)) if row.startswith("5 ")]
     looks = looks_of_cases(listed, np.array([1, 5]))
     assert [each["label"] for each in looks] == ["soft (deployed)", "stops (stalled)"]
+
+
+def test_the_base_case_is_the_first_sample_also_where_that_has_not_run() -> None:
+    """As of another part of a campaign that runs in parts."""
+    made = made_campaign(8, not_run=[0])
+    made.attrs["design"] = '{"kind": "one-at-a-time"}'
+    moduli, times = np.full(8, 1e11), np.full(8, "none", dtype="<U4")
+    moduli[1], times[7] = 2e11, "4.0"
+    for name, values in (
+        ("rods_young_modulus", moduli), ("cables_lower_winch_stop_time", times),
+        ("cables_upper_friction_coefficient", np.zeros((8, 3))),
+    ):  # fmt: skip
+        made[name] = made[name].dims, values, made[name].attrs
+    lines = "\n".join(worst_lines(analyse(made), "DIR"))
+    assert "inputs: cables.lower_winch_stop_time = 4 s (base: none)" in lines
+    assert "base: 200 GPa" not in lines

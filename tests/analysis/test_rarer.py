@@ -339,3 +339,18 @@ def test_weights_of_two_values_and_replicates_without_the_event():
     weights = np.random.default_rng(1).random(400)
     _, (ends,) = ratio_of(np.arange(400) % 8 == 0, weights, np.arange(400) % 8, [0.05])
     assert np.isnan(ends).all()
+
+
+def test_the_interval_of_a_drawn_fault_holds_the_truth():
+    """All violations have the fault: a tenth less of it makes a tenth less of them, and the share
+    of samples that have it is uncertain itself.
+    """
+    rng, held = np.random.default_rng(1), 0
+    weights = np.array([(1.0 - 0.9 * 0.3) / 0.7, 0.9])
+    for _ in range(200):
+        fault = rng.random(200) < 0.3
+        own = fault & (rng.random(200) < 0.5)
+        ratio, ((low, high),) = ratio_of(own, weights[fault.astype(int)], None, [0.05])
+        assert low - 1e-9 <= ratio <= high + 1e-9
+        held += low - 1e-9 <= 0.9 <= high + 1e-9
+    assert held >= 190

@@ -295,3 +295,36 @@ def test_no_variable_is_led_to_a_number_of_another_sense() -> None:
             for other, one in VARIABLES.items():
                 if not one.dims and other in words and (one.largest_of or one.least_of):
                     assert getattr(one, attribute) == name, (name, key, other)
+
+
+def test_a_limit_that_some_samples_do_not_have_is_judged_by_the_others() -> None:
+    made = made_campaign(8)  # peaks of 20 N and more, by one from sample to sample
+    drawn = np.where(np.arange(8) % 2, "none", "22.0")
+    law = '{"kind": "discrete", "values": [22.0, "none"]}'
+    says = {"role": "input", "path": "limits.tension", "units": "N", "distribution": law}
+    made["limits_tension"] = "sample", drawn, says
+    (row,) = (row for row in margin_table(analyse(made)).rows if "limits.tension" in row[0])
+    assert row[0] == "limits.tension = 22 N"
+    assert row[2:] == ("26 N", "-0.154: NOT enough", "6", "2 of 4")
+
+
+def test_of_no_pair_that_has_both_values_no_difference_is_told() -> None:
+    """Four rings stall here and the other four there: their times are of other antennas."""
+    first, second = made_campaign(8, stalled=[0, 1, 2, 3]), made_campaign(8, stalled=[4, 5, 6, 7])
+    first["deployment_time"][4:], second["deployment_time"][:4] = [10, 11, 12, 13], [20, 21, 22, 23]
+    for each in first, second:
+        each["sample_seed"] = "sample", np.arange(8)
+    found = compare(first, second)
+    assert found.attrs["pairs"] == 8
+    assert np.isnan(found.deployment_time_difference)
+    rows = {row[0]: row for row in sections(found)["outputs"].tables[0].rows}
+    assert rows["deployment_time"][2:] == ("11.5", "21.5", "4 and 4")
+
+
+def test_parts_that_have_run_other_samples_are_not_paired_by_what_is_true() -> None:
+    first, second = made_campaign(12, not_run=range(6, 12)), made_campaign(12, not_run=range(6))
+    for each in first, second:
+        each["sample_seed"] = "sample", np.arange(12)
+    assert "samples are not paired: of no pair both have run" in "\n".join(
+        compared(compare(first, second))
+    )
