@@ -1,5 +1,6 @@
 """Results in the formats of other programs: tables as CSV, files for MATLAB and for ParaView."""
 
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -265,7 +266,8 @@ def write_pvd(run: xr.Dataset, folder: Path, stem: str) -> list[Path]:
     except ValueError as error:
         raise InputError(f"{path}: {error}: there is nothing to show") from error
     parts = ", ".join(f"part {k} {name}" for k, name in enumerate(shape.points.lines))
-    words = escape(f"{run.attrs.get('title', '')}: {shape.words}; {parts}").replace("--", "- -")
+    told = escape(f"{run.attrs.get('title', '')}: {shape.words}; {parts}")
+    words = re.sub("-(?=-)", "- ", told)  # two hyphens would end the comment
     inner.mkdir(exist_ok=True)
     entries = ""
     values = _values(run, shape)

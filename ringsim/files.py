@@ -149,9 +149,9 @@ def require_regular(path: Path) -> None:
         raise InputError(f"{path}: is a pipe or a device, but must be a file: copy it into one")
 
 
-def require_file(path: Path) -> None:
-    """Refuse (InputError) a name or a place at which no netCDF file can be written, and the files
-    of a campaign, which nothing else may replace.
+def require_file(path: Path, *sources: Path) -> None:
+    """Refuse (InputError) a name or a place at which no netCDF file can be written, the files of a
+    campaign, which nothing else may replace, and the ``sources`` of what is written.
     """
     require_place(path)
     if path.suffix != ".nc":
@@ -163,6 +163,8 @@ def require_file(path: Path) -> None:
         raise InputError(
             f"{path}: this file belongs to the campaign in its folder: choose another name"
         )
+    if path.exists() and any(each.exists() and path.samefile(each) for each in sources):
+        raise InputError(f"{path}: what is read from this file would be lost: choose another name")
 
 
 @contextlib.contextmanager

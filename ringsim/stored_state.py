@@ -12,6 +12,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.outputs.recorder import FORMAT, StoredState
 from ringsim.refusal import InputError, show
 from ringsim.scene import Scene, scene_from_toml
+from ringsim.scene.substituted import substituted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,10 +27,10 @@ def layout_fingerprint(scene: Scene) -> str:
     Masses, stiffnesses and laws are left out.  Lengths count to 1e-9 m: a state of other lengths
     would begin with strained rods.
     """
-    layout = layout_of(scene)
+    layout = layout_of(substituted(scene))
     parts: list[Any] = [
         [(body.pose.place, body.pose.axes) for body in layout.bodies],
-        [(rod.name, rod.section, rod.start.place, rod.end.place, rod.stations)
+        [(rod.name, rod.section, rod.start.place, rod.end.place, rod.stations, rod.strain)
          for rod in layout.rods],
         [(joint.kind, joint.first, joint.second, joint.error) for joint in layout.joints],
         layout.openings, layout.paths, layout.base,

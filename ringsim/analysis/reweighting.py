@@ -480,8 +480,8 @@ def reweight(
         # What failed runs would have done nobody knows: from none of them to all.
         both = own[run], (own | gone)[run]
         if has_share_intervals(placed) and decisive >= LEAST_OF_SHARE:
-            told_of = (share_interval(each, weights[run], by) for each in both)
-            ends = tuple(each[side] for side, each in enumerate(told_of))
+            least, most = (share_interval(each, weights[run], by) for each in both)
+            ends = least[0], most[1]
         elif has_share_intervals(placed):
             cap = cap or Cap(pairs, int(run.sum()), (1 - LEVEL) / 2)
             ends = _rarer(cap, both[0], ~both[1], weights[run], by)
@@ -586,8 +586,7 @@ def _told(
 def _events(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement], ok: Mask, gone: Mask
 ) -> dict[str, tuple[Mask, Mask]]:
-    """What may happen to a sample: which samples it happened to, of which: all that ran, and of
-    requirements, as their verdicts have it, those whose numbers hold."""
+    """What may happen to a sample: which it happened to, of all that ran; of those that hold."""
     found: dict[str, tuple[Mask, Mask]] = {}
     if OUTCOME in campaign and ok.any():
         words = endings(campaign)

@@ -528,7 +528,7 @@ def margins(campaign: xr.Dataset, plane: str = "") -> xr.Dataset:
         if np.isfinite(least).any():
             k = int(np.nanargmin(least))
             counts = int((least < 0.0).sum()), int(np.isfinite(least).sum())
-            rows.append((f"{name} >= 0", name, name, *2 * [float(least[k])], k, *counts))
+            rows.append((f"{name} >= 0", name, name, float(least[k]), float(least[k]), k, *counts))
     if not rows:
         return xr.Dataset()
     texts, names, told_of, margin, value, places, beyond, of_all = zip(*rows, strict=True)

@@ -520,10 +520,13 @@ class Sampler:
         controller begins with its next sample.
         """
         self._next = math.ceil((time - AT_ONCE) / self.controller.period)
+        # What failed encoders show is the stand's, whoever reads it.
+        unread = np.full(self.encoders.shape, math.nan)
+        self._shown = unread if memory is None else memory["shown"][1]
         if memory is None or not same:
             self.controller, self._sent = self.controller.begin(self.controller.scene), []
             return
-        self._next, self._shown = memory["next"], memory["shown"][1]
+        self._next = memory["next"]
         self._sent = [(at, dict(zip(*told, strict=True))) for at, *told in memory["sent"]]
         self.controller.state.clear()
         self.controller.state.update(memory["state"])

@@ -66,6 +66,7 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
         if "stop_when" in attributes:
             attributes["planned_samples"] = planned
         for last in (False, True):
+            read = _newest(campaign.path)
             found = campaign.survey()
             checks = campaign.survey(checks=True) if len(campaign.checked) else None
             left, failed = len(found.missing), len(found.failed)
@@ -82,6 +83,8 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
                     campaign.path, found, campaign.table, campaign.scene, output, attributes,
                     checks,
                 )  # fmt: skip
+                if 0.0 < read < math.inf:
+                    os.utime(path, (read, read))
                 break
             except DamagedError:
                 if last:
@@ -98,9 +101,14 @@ def is_behind(folder: Path) -> bool:
     merged = folder / MERGED
     if not merged.exists():
         return True
+    # What was written while it merged is no part of it: it has the time of what it has read.
+    return _newest(folder) > merged.stat().st_mtime and os.access(folder, os.W_OK)
+
+
+def _newest(folder: Path) -> float:
+    """When a journal was written last, s; infinite if one is no file."""
     journals = (folder / FOLDER).glob("*.journal")
-    newest = max((f.stat().st_mtime if f.is_file() else math.inf for f in journals), default=0.0)
-    return newest > merged.stat().st_mtime and os.access(folder, os.W_OK)
+    return max((f.stat().st_mtime if f.is_file() else math.inf for f in journals), default=0.0)
 
 
 # The file, in bounded memory.

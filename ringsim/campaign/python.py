@@ -188,6 +188,11 @@ class Campaign:
             ``max_difference``, or a task of an executor was lost, after which the same call goes
             on.  Failed samples alone are no error: see ``status``.
         """
+        if settings and not retry_failed:
+            raise InputError(
+                f"settings: {', '.join(settings)}: they are for samples that failed: give "
+                "retry_failed=True, too"
+            )
         order = self._order(out, retry_failed, settings or {}, part)
         if executor is not None:
             return self._opened(order.folder, self._run_on(executor, workers, order))

@@ -3,6 +3,8 @@
 import contextlib
 import csv
 import io
+import json
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -22,11 +24,11 @@ from ringsim.campaign.folder import (
     Folder,
     check_settings,
     open_folder,
+    opened_as,
     prepare_folder,
-    require_this_build,
 )
 from ringsim.campaign.merging import merge
-from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
+from ringsim.campaign.specification import SOLVERS, Campaign, campaign_of, load_campaign
 from ringsim.campaign.watch import (
     Progress,
     StopRequest,
@@ -123,7 +125,12 @@ def run_campaign(folder: Path, choices: Choices) -> int:
                 fault = str(error)
         if fault := scheduler.from_first(fault):
             raise InputError(fault)
-        campaign = open_folder(folder)
+        try:
+            campaign = open_folder(folder)
+        except InputError as error:  # of one rank, as on a machine that does not see the folder
+            fault = str(error)
+        if fault := next(filter(None, scheduler.from_all(fault)), ""):
+            raise InputError(fault)
         _run_missing(campaign, choices, stop)
         try:
             return _conclude(campaign, choices, stop) if scheduler.rank == 0 else EXIT_DONE
@@ -420,9 +427,30 @@ class Order(NamedTuple):
                 f"{self.folder}: this folder has the campaign {held}, not {name}: choose another "
                 "folder with --out"
             )
-        require_this_build(begun)
+        self._require_begun(begun)
         begun.survey()
         return False
+
+    def _require_begun(self, begun: Folder) -> None:
+        """Refuse (InputError) a folder that was not begun with this file, whose settings of the
+        command line count again: those of today are of failed samples.
+        """
+        text, held = self.campaign.text, str(begun.attributes["campaign"])
+        called = re.findall(r"^# called with --set (\S+) = (.*)$", held, re.MULTILINE)
+        sizes = [re.findall(r"^# called with --samples (\d+)$", own, re.MULTILINE)
+                 for own in (text, held)]  # fmt: skip
+        size = next((int(each[-1]) for each in sizes if each), None)
+        settings = {name: json.loads(value) for name, value in called}
+        plain = re.sub(r"^# called with .*$", "", text, flags=re.MULTILINE)
+        campaign = campaign_of(plain, self.campaign.file, settings, size)
+        table = campaign.draw()
+        opened_as(campaign, self.folder, table, self.solving)
+        if table.samples > begun.table.samples:
+            raise InputError(
+                f"{self.folder}: was begun with {begun.table.samples} samples, and --retry-failed "
+                f"runs failed ones of these: leave it out to run the {table.samples} of "
+                f"{self.campaign.file.name}"
+            )
 
     @property
     def choices(self) -> tuple[Any, ...]:

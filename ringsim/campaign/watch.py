@@ -157,9 +157,8 @@ class Watch:
         self._left[self._look_of(number)] -= 1
 
     def ended(self) -> str:
-        """Why the samples are enough, or an empty string; asked often.
-
-        InputError if the rule asks for what the samples do not tell.
+        """Why the samples are enough, or an empty string; asked often.  What asks for numbers that
+        the samples do not tell is not enough.
         """
         while self._judge is not None and not self._end and self._next < len(self._numbers):
             waits = any(self._left[look] for look in range(self._next + 1))
@@ -167,7 +166,11 @@ class Watch:
             if waits or time.monotonic() - self._asked < _PAUSE:
                 break
             count = self._numbers[self._next]
-            if (told := self._judge.at(count)) is None:
+            try:
+                told = self._judge.at(count)
+            except InputError:
+                told = ""
+            if told is None:
                 self._asked = time.monotonic()
                 break
             if told:

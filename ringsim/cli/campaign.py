@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.campaign.folder import open_folder, other_build
+from ringsim.campaign.merging import is_behind
 from ringsim.campaign.plan import plan, status_lines
 from ringsim.campaign.run import Order, Share, require_no_launcher, start
 from ringsim.campaign.specification import SOLVERS, load_campaign
@@ -90,8 +91,9 @@ def campaign_command(
         return Order(campaign, folder, share, retry_failed, theirs, solver, judge)
 
     def draw(folder: Path) -> None:
-        # As long as samples are left, a file would be an older one.
-        if not plot or len(as_decided(open_folder(folder)).survey().missing):
+        # As long as samples or checks are left, or are not merged, a file would be an older one.
+        held = as_decided(open_folder(folder)) if plot else None
+        if held is None or len(held.survey().missing) or len(held.unchecked()) or is_behind(folder):
             return
         from ringsim.analysis.design import open_stored
 

@@ -122,7 +122,7 @@ def analyse_command(
 
     others = parse_reweighted(reweighted)
     if out is not None:
-        require_file(out)
+        require_file(out, source)
     with opened(source) as campaign:  # which tells what further outputs there are
         wanted = required_by(campaign.attrs) | parse_requirements(required)
         if gate and not wanted:
@@ -384,7 +384,7 @@ def compare_command(
     if out is not None:
         if out.suffix == ".html":
             raise InputError(f"--out {out}: it writes netCDF; the page is --report {out}")
-        require_file(out)
+        require_file(out, first, second)
     if second.suffix == ".toml":
         if page is not None:
             raise InputError(

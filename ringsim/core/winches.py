@@ -325,7 +325,9 @@ class Winches:
         for place, winch in self._winches.items():
             if place[0] == number and winch.after_lock != "pull":
                 tension = float(state.winch_tensions[place])
-                self._winches[place] = winch.locked(time, tension)
+                now = self._winches[place] = winch.locked(time, tension)
+                if isinstance(now.winding, FeedbackWinding):  # it begins with what is on its drum
+                    self._ahead.pop(place, None)
         self._tell()
 
     def driving(self, time: float, state: ChainState) -> bool:

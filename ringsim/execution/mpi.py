@@ -151,7 +151,10 @@ class Mpi(Scheduler):
             return True
 
         while True:
-            reason = reason or fault or work.stop()
+            try:
+                reason = reason or fault or work.stop()
+            except InputError as error:  # or the other ranks would wait for ever
+                reason = fault = str(error)
             if reason or not (queue or slot.busy or any(held.values())):
                 break
             # A rank may hold two samples, more if they are short, one towards the end.

@@ -12,7 +12,7 @@ from ringsim.cable.ropes import CableFault, Ropes
 from ringsim.core.library import call
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
-from ringsim.frame.readings import EnergyMeter, FrameMeters
+from ringsim.frame.readings import CLOSE, EnergyMeter, FrameMeters
 from ringsim.frame.state import State
 from ringsim.hermite import extrapolated
 from ringsim.layout.bodies import Array
@@ -23,6 +23,7 @@ from ringsim.parts.laws import Place, Switches
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import scales_of
 from ringsim.scene import Scene
+from ringsim.scene.substituted import substituted
 from ringsim.stepping.control import go_on
 from ringsim.stepping.instant import Instant, Memory, Strained, Watch
 from ringsim.stepping.run import Run
@@ -279,8 +280,14 @@ class Storing(Integration):
     def _go_on(self, start: StoredState) -> None:
         """Take a stored state over."""
         model, memory, changed = self.model, start.memory, start.changed_to(self._scene)
+        shares = self._points_of(start) if changed else None
         self.recall(memory)
         state = self._now
+        if shares is not None:
+            for each in state.followed:
+                points = each[: 3 * len(shares)].reshape(-1, 3)
+                points[:] = shares @ points
+            model.place(state)
         go_on(self._control, self._scene.solver, memory["stepping"], changed, start.name)
         self.history.take_over(start.history, memory["recorder"], start.scenes, start.name)
         if self._sampler is not None:
@@ -306,6 +313,29 @@ class Storing(Integration):
         self.history.forget_last()
         self._control.begin_anew(self._read(replace(now, energies=energies)), lost)
         self._latch(start.time)
+
+    def _points_of(self, start: StoredState) -> Array | None:
+        """Shares of the points of the state's scene in those that carry the masses of bodies here,
+        where these stand elsewhere in their bodies, of whose (arm, 1) sums are taken; else None.
+        """
+        own, before = self.model.mesh, FrameModel(substituted(start.scene)).mesh
+        if np.array_equal(own.point_arm, before.point_arm):
+            return None
+        refused = InputError(
+            f"{start.name}: a body had no mass around its origin, or has none any more, so that "
+            "its turning would begin anew: start from the beginning"
+        )
+        if not np.array_equal(own.point_frame, before.point_frame):
+            raise refused
+        shares = np.eye(len(own.point_frame))
+        for frame in np.unique(own.point_frame[(own.point_arm != before.point_arm).any(axis=1)]):
+            k = np.flatnonzero(own.point_frame == frame)
+            new, old = (np.vstack([each.point_arm[k].T, np.ones(len(k))]) for each in (own, before))
+            found = np.linalg.lstsq(old, new, rcond=None)[0]
+            if np.abs(old @ found - new).max() > CLOSE:
+                raise refused
+            shares[np.ix_(k, k)] = found.T
+        return shares
 
     def _strike_again(self, start: StoredState, gone: list[Fault]) -> None:
         """Let all faults have struck that had, but those that are gone."""

@@ -304,7 +304,7 @@ class FrameModel:
             answer, lambda function: call(name, self.system, roped, asks, function, step, *given)
         )
 
-    def _place(self, state: State) -> None:
+    def place(self, state: State) -> None:
         """Places of all followed coordinates at the state's pose."""
         call(
             "put_in_place", self.mesh, self._paths, self._held, state.pose, state.hub, self._arms,
@@ -328,7 +328,7 @@ class FrameModel:
             Followed.at_rest(np.zeros(self._held.cuts[-1]), np.zeros(self._held.cuts[-1])),
             self._held,
         )  # fmt: skip
-        self._place(state)
+        self.place(state)
         if any(rod.nodes for rod in self.layout.rods):
             points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
             still = np.zeros_like(points)
@@ -343,8 +343,8 @@ class FrameModel:
             self.first[-3:] = self.first[self._string_spots].mean(axis=0)
             ahead.hub += small * self.first[-3:]
             behind.hub -= small * self.first[-3:]
-        self._place(ahead)
-        self._place(behind)
+        self.place(ahead)
+        self.place(behind)
         acceleration = (ahead.followed.place - behind.followed.place) / (2.0 * small)
         followed = Followed.at_rest(state.followed.place, acceleration)
         return State(pose, hub, state.strains, followed, self._held)

@@ -23,7 +23,7 @@ from ringsim.stepping.instant import Energies, Remembering
 # What outputs read of a state, in joint coordinates.
 
 
-_CLOSE = 1e-9
+CLOSE = 1e-9
 """How far a point may be off those with mass of its body, m."""
 
 
@@ -170,7 +170,7 @@ def weights_of(mesh: Mesh, where: OnBody) -> Array:
     known = np.vstack([mesh.point_arm[own].T, np.ones(len(own))])
     wanted = np.append(where.arm, 1.0)
     row[own] = np.linalg.lstsq(known, wanted, rcond=None)[0]
-    if np.abs(known @ row[own] - wanted).max() > _CLOSE:
+    if np.abs(known @ row[own] - wanted).max() > CLOSE:
         raise InputError(
             f"record: body {where.body + 1} has no mass around its origin that tells where that is "
             "(positions and accelerations need it): give it an inertia, or choose fidelity = "

@@ -33,6 +33,7 @@ from ringsim.outputs.rods_and_cables import slackened
 from ringsim.parts.faults import AT_ONCE, Fault
 from ringsim.refusal import InputError, show
 from ringsim.scene import Scene
+from ringsim.scene.substituted import substituted
 from ringsim.stepping.control import RunControl
 from ringsim.stepping.instant import Energies, Memory, Remembering, pack, unpack
 from ringsim.stepping.locks import lock_times
@@ -167,7 +168,8 @@ class Recorder(Remembering):
         self.energies[:] = [Energies(*row.tolist()) for row in history["energies"][:steps]]
         # What a scene was made of decides about readings that were made with it, ever after.
         self._before = list(before)
-        while self._before and self._before[-1][1] == self._scene:  # nothing has changed since
+        # Nothing has changed since.
+        while self._before and substituted(self._before[-1][1]) == substituted(self._scene):
             self._before.pop()
 
     def _lists(self) -> dict[str, list[Any]]:
@@ -294,7 +296,7 @@ def spanned(values: Iterable[str], known: Mapping[str, NDArray[Any]]) -> dict[st
 # States stored on the way of a run, and going on from one.
 
 
-FORMAT = 6
+FORMAT = 7
 """Of what is stored; a state of another format is refused."""
 
 
@@ -345,8 +347,9 @@ class StoredState:
         return dict(_changes(self.scene.to_table(), scene.to_table()))
 
     def changed_to(self, scene: Scene) -> bool:
-        """Whether a scene moves in another way."""
-        return any(path.split(".")[0] not in _BESIDE for path in self.changes_in(scene))
+        """Whether a scene moves in another way, at whatever temperatures."""
+        before, now = (substituted(each).to_table() for each in (self.scene, scene))
+        return any(path.split(".")[0] not in _BESIDE for path, _ in _changes(before, now))
 
     def told(self, scene: Scene) -> str:
         """From where a scene goes on, and what is another than before."""

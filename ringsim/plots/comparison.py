@@ -96,6 +96,8 @@ def _figures(
             words = "Distribution of each main number in both"
             yield "values", words, _noted(values(found, both, names), unmoved, left)
     names = [n for n in _COURSES if all(n in each and "time" in each[n].dims for each in both)]
+    if not names:
+        return
     until, lines = _until(both)[0], _lines_of(both)
     drawn = {
         name: [_course(*each, name) for each in zip(both, until, lines, strict=True)]

@@ -123,6 +123,8 @@ class RunControl(Remembering):
         for kind, part in self._parts().items():
             if kind in memory["parts"]:
                 part.recall(memory["parts"][kind])
+        if isinstance(self._steps, ConstantSteps) and "ConstantSteps" not in memory["parts"]:
+            self._guard.go_on_with_constant_steps()
         self._leave_tensions()
 
     def begin_anew(self, now: Instant, lost: float) -> None:

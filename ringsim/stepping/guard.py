@@ -66,16 +66,20 @@ class ConstantSteps(Remembering):
         return min(self.step, left)
 
 
-def unresolved(run: list[Instant], slack_tension: float | None) -> Reason:
+def unresolved(
+    run: list[Instant], slack_tension: float | None, *, from_rest: bool = True
+) -> Reason:  # fmt: skip
     """Why constant steps have not resolved a run; empty if they have.
 
     A swing of the tension T with the angular frequency w bends it from one step to the next by
     |T(n-1) - 2 T(n) + T(n+1)| = 2 (1 - cos(w h)) |T - mean|.  Bends below the slack tension (N;
     None without cables) do not matter.
     """
+    if not run:
+        return Reason()
     times, angles = np.array([(one.time, one.angles.max()) for one in run]).T
     first = int(np.argmax(angles >= math.pi))
-    if 0 < first < STEPS:
+    if from_rest and 0 < first < STEPS:
         return Reason(
             Cause.FEW_STEPS,
             f"the first V-joint locked within {first} steps, at {times[first]:.3g} s, fewer than "
@@ -131,7 +135,7 @@ _CURE = "reduce solver.step or solver.tolerance"
 class Guard(Remembering):
     """Watches one run from its first instant on."""
 
-    changing = ("_run", "_lost", "_driven", "_credit", "_low", "_high", "_worst")
+    changing = ("_run", "_lost", "_driven", "_credit", "_low", "_high", "_worst", "_behind")
 
     def __init__(self, solver: Solver, scales: Scales, strained: Strained = AS_DRAWN) -> None:
         self._tolerance, self._scales, self._strained = solver.energy_tolerance, scales, strained
@@ -140,6 +144,11 @@ class Guard(Remembering):
         self._lost = self._driven = self._credit = 0.0
         self._low, self._high = [math.inf] * 4, [-math.inf] * 4
         self._worst = (0.0, 0.0)
+        self._behind = False
+
+    def go_on_with_constant_steps(self) -> None:
+        """Judge them from here on: those before were of another kind."""
+        self._behind = True
 
     def judge(self, now: Instant) -> Reason:
         """Why the run must stop here: cause, measured value, bound and cure; empty if not."""
@@ -204,7 +213,8 @@ class Guard(Remembering):
         reason = self._unbalanced(*self._worst, least, 1.0, "solver.energy_tolerance")
         if reason or not self._constant:
             return reason
-        return unresolved(self._run, self._scales.slack_tension)
+        run = self._run[1:] if self._behind else self._run
+        return unresolved(run, self._scales.slack_tension, from_rest=not self._behind)
 
     def _ranges(self) -> list[float]:
         return [high - low for low, high in zip(self._low, self._high, strict=True)]

@@ -53,9 +53,9 @@ def plain_rope(cable, slip, points, velocities, content, wound, rates, alive=1.0
     length = [float(np.linalg.norm(each)) for each in apart]
     unit = [each / size for each, size in zip(apart, length, strict=True)]
     growing = [float(u @ v) for u, v in zip(unit, moving, strict=True)]
-    path, path_rate, natural = sum(length), sum(growing), content - wound
+    path, path_rate, natural = sum(length), sum(growing), content - alive * wound
     winding = sum(rates)
-    strain = (path - natural) / natural
+    strain = alive * (path - natural) / natural
     strain_rate = (path_rate + path / natural * winding) / natural
     force = cable.axial_stiffness * (strain + cable.damping_time * strain_rate)
     width = cable.slack_width

@@ -65,7 +65,9 @@ void wind(const RopeTable *ropes, const D *wound, I n_wound, const D *rates, I n
         place = place_behind(ropes, rope, place);
         const D *turned = wound + 2 * place.cable, *rate = rates + 2 * place.cable;
         D near = place.begins ? turned[0] : 0.0, far = place.ends ? turned[1] : 0.0;
-        drums->natural.at[rope] = ropes->content.at[rope] - (near + far);
+        /* A rope that holds nothing is wound up, and that is all. */
+        D taken = ropes->alive.at[rope] > 0.0 ? near + far : 0.0;
+        drums->natural.at[rope] = ropes->content.at[rope] - taken;
         near = place.begins ? rate[0] : 0.0, far = place.ends ? rate[1] : 0.0;
         drums->winding.at[rope] = near + far;
         drums->inflow.at[rope] = -far;
@@ -183,7 +185,7 @@ void read_chain(const RopeTable *ropes, const Drums *drums, const Spans *spans, 
         const D *material = ropes->material.at + 3 * rope;
         Path path = path_of(ropes, spans, rope);
         D natural = drums->natural.at[rope], winding = drums->winding.at[rope], width = material[2];
-        D alive = ropes->alive.at[rope], strain = path.length / natural - 1.0;
+        D alive = ropes->alive.at[rope], strain = alive * (path.length / natural - 1.0);
         D elastic = strain * material[0], mean = alive * tension_of(material, natural, winding, path);
         out[rope] = path.length, out[count + rope] = path.rate, out[2 * count + rope] = strain;
         out[3 * count + rope] = (path.rate + path.length / natural * winding) / natural;
