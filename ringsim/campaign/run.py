@@ -427,8 +427,8 @@ class Order(NamedTuple):
                 f"{self.folder}: this folder has the campaign {held}, not {name}: choose another "
                 "folder with --out"
             )
-        self._require_begun(begun)
         begun.survey()
+        self._require_begun(begun)
         return False
 
     def _require_begun(self, begun: Folder) -> None:
