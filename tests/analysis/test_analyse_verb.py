@@ -192,3 +192,14 @@ def test_a_requirement_that_changes_later_is_taken_over_and_nothing_runs_again(s
         xr.open_dataset(study / "campaign.nc") as old,
     ):
         np.testing.assert_array_equal(now.deployment_time, old.deployment_time)
+
+
+def test_the_file_that_is_read_is_not_written(tmp_path):
+    """The campaign of a mailed file was gone."""
+    path = tmp_path / "mailed.nc"
+    campaign([1.0, 2.0, 3.0]).to_netcdf(path)
+    held = path.read_bytes()
+    done = CliRunner().invoke(analyse_command, [str(path), "--out", str(path)])
+    assert isinstance(done.exception, InputError)
+    assert "what is read from this file would be lost" in str(done.exception)
+    assert path.read_bytes() == held

@@ -238,3 +238,8 @@ def test_replay_refuses_checks_that_a_campaign_does_not_have() -> None:
     assert done.exit_code == 2
     told = "--check: runs/small has no checks with the full engine (check_every): leave it out"
     assert told in done.output
+
+
+def test_settings_alone_are_refused_with_what_they_are_for() -> None:
+    with pytest.raises(InputError, match=r"settings: solver\.step: .* give retry_failed=True, too"):
+        small().run(workers=0, settings={"solver.step": 0.1})

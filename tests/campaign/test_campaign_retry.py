@@ -95,3 +95,23 @@ def test_other_physics_is_refused(words, told, bench):
     assert told in printed
     assert len(printed.splitlines()) == 1
     assert len(stored(bench)) == 2
+
+
+def test_a_changed_file_is_refused_as_without_the_flag(bench):
+    """Other inputs and more samples were passed over, and the old campaign was told as done."""
+    bench.write_listed([30, 12])
+    poisoned(bench)
+    bench.write_listed([30, 11])
+    assert "this folder has another campaign" in poisoned(bench, "--retry-failed", code=2)
+    bench.write_listed([30, 12, 30])
+    (line,) = poisoned(bench, "--retry-failed", code=2).splitlines()
+    assert "was begun with 2 samples, and --retry-failed runs failed ones of these" in line
+    bench.write_listed([30, 12])
+    assert "2 samples, 1 failed" in poisoned(bench, "--retry-failed")
+
+
+def test_settings_that_a_campaign_was_begun_with_stay(bench):
+    bench.write_listed([30, 12])
+    poisoned(bench, "--set", "structure.sections=4")
+    assert "2 samples, 1 failed" in poisoned(bench, "--retry-failed")
+    assert "this folder has another campaign" in poisoned(bench, code=2)

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign_bench import START, assert_same, finished, lose, opened, ranks_of
+from campaign_bench import START, Bench, assert_same, finished, journals, lose, opened, ranks_of
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.merging import merge
+from ringsim.campaign.merging import is_behind, merge
 from ringsim.campaign.run import Choices, run_campaign
 from ringsim.execution.slot import Serial
 from ringsim.execution.work import Allowance
@@ -176,3 +176,31 @@ def test_folder_may_have_any_name(name, bench):
 def test_folder_whose_name_is_no_text_is_refused(bench):
     printed = bench.run("campaign", bench.write(1), "--out", os.fsdecode(b"a\xffb"), code=2)
     assert "its name is not UTF-8" in printed
+
+
+def test_a_rank_that_does_not_see_the_folder_ends_the_job_with_a_word(tmp_path, mpi):
+    """As on a machine where the folder is its own: the first rank waited for it for ever."""
+    benches = [Bench(tmp_path / name) for name in ("one", "two")]
+    words = []
+    for bench in benches:
+        bench.folder.mkdir()
+        bench.write(2)
+        command = bench.command(*START[:2], "--out", "out", ranks=1)
+        words.append([*command[1:3], "-wdir", str(bench.folder), *command[3:]])
+    call = [command[0], *words[0], ":", *words[1]]
+    done = subprocess.run(
+        call, env=benches[0].environment(), capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 2
+    assert "out" in done.stdout + done.stderr
+
+
+def test_what_is_written_while_a_file_is_merged_is_no_part_of_it(copied):
+    folder = copied.folder / "out"
+    copied.run("merge", "out")
+    newest = max(journals(copied), key=lambda path: path.stat().st_mtime)
+    assert not is_behind(folder)
+    assert (folder / "campaign.nc").stat().st_mtime <= newest.stat().st_mtime
+    later = newest.stat().st_mtime + 0.01
+    os.utime(newest, (later, later))
+    assert is_behind(folder)

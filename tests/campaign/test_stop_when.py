@@ -158,3 +158,23 @@ def test_rules_that_cannot_be_followed_are_refused(change, words, tmp_path):
     path.write_text(text.replace(*change))
     with pytest.raises(InputError, match=re.escape(words)):
         load_campaign(path)
+
+
+def test_a_look_at_samples_without_numbers_ends_nothing(bench):
+    """All of the first look have failed: the campaign goes on, as its resumption would."""
+    path = bench.write_listed([30])
+    path.write_text(
+        path.read_text().replace(
+            'design = { kind = "list", file = "ways.csv" }',
+            'design = { kind = "random", samples = 24 }\n'
+            'stop_when = { requirement = "deployment_time" }\nlooks = { first = 8 }\n',
+        )
+        + '[inputs]\n"rods.poisson_ratio" = { kind = "discrete", values = [0.12] }\n'
+        + "[requirements]\n"
+        "deployment_time = { max = 15.0, probability = 0.5, confidence = 0.9 }\n"
+    )
+    start = ("campaign", "listed.toml", "--workers", 0, "--out", "out")
+    bench.run(*start, solver="fake_solver:poisoned", code=3)
+    found = bench.result("out")
+    assert found.sizes["sample"] == 24
+    assert (found.status > 0).all()

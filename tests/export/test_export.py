@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import meshio
+import netCDF4
 import numpy as np
 import pandas as pd
 import pytest
@@ -238,3 +239,14 @@ def test_counts_are_whole_numbers_and_what_is_none_is_left_as_it_is(
         save(xr.Dataset({"locked_joints": ("sample", np.array(values))}), tmp_path / "some.nc")
         with xr.open_dataset(tmp_path / "some.nc") as found:
             assert found["locked_joints"].values.tolist() == values
+
+
+def test_a_title_of_hyphens_is_no_end_of_a_comment(run_file: Path) -> None:
+    with netCDF4.Dataset(run_file, "a") as file:
+        file.title = "Opening --- cold -- case"
+    export(run_file, "--format", "pvd")
+    text = run_file.with_suffix(".pvd").read_text()
+    assert "Opening - - - cold - - case" in text
+    ElementTree.fromstring(text)
+    for file in run_file.parent.glob("*-vtu/*.vtu"):
+        ElementTree.parse(file)
