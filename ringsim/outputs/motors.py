@@ -133,10 +133,10 @@ class Motors(Output):
         torque, shaft, power, energy = found
         current, supplied, lost, lagged, climbed, begun = np.full((6, *torque.shape), np.nan)
         # A run that went on may have had another motor before, or none: each for its own steps.
-        for steps, (plane, end), winch, motor in _motors(run):
+        for steps, (plane, end), winch, motor, controlled in _motors(run, times):
             tension, speed, wound, told = series.values[:, plane, end].T
             ending = motor
-            if np.any(told != motor.commanded_speed()):  # by a controller
+            if controlled and np.any(told != motor.commanded_speed()):
                 # A step ends with the command with which it began.
                 ending, motor = (
                     motor.model_copy(update={"speed": each / motor.travel, "ramp": None})
@@ -209,7 +209,7 @@ class Motors(Output):
         if "torque_constant" in holds(run.scene):
             taken = energy + np.cumsum(lost, axis=0)
             values |= _electrical(series, current, supplied, supplied - power, taken)
-        each = [motor for *_, motor in _motors(run)]
+        each = [motor for *_, motor, _ in _motors(run, times)]
         # Between readings nothing is above the line of the motor, as a parabola may be.
         bounds = (
             max((one.available(0.0) for one in each), default=math.inf),
@@ -266,14 +266,26 @@ def _electrical(series: Series, *courses: Array) -> Values:
 
 
 def _motors(
-    run: Run,
-) -> Iterator[tuple[NDArray[np.intp], tuple[int, int], Winch, MotorWinding]]:
-    """Steps, plane and end of every motor, with its winch and itself as they were then."""
+    run: Run, times: Array
+) -> Iterator[tuple[NDArray[np.intp], tuple[int, int], Winch, MotorWinding, bool]]:
+    """Steps, plane and end of every motor, with its winch and itself as they were then, and whether
+    a controller commands it.  One that holds its tension after the lock follows no command then,
+    and takes no torque for its rotor.
+    """
     for steps, scene in run.stretches():
         for plane, cable in [] if scene.cables is None else scene.cables.present():
             for end, winch in enumerate(cable.winches):
-                if (motor := winch.winding.motor) is not None:
-                    yield steps, (plane, end), winch, motor
+                if (motor := winch.winding.motor) is None:
+                    continue
+                place, known = (plane, end), scene.controller is not None
+                held = math.inf
+                if winch.after_lock == "hold":
+                    held = float(np.nan_to_num(run.held[plane].max(), nan=math.inf))
+                later = times[steps] > held + AT_ONCE
+                yield steps[~later], place, winch, motor, known
+                if later.any():
+                    still = {"rotor_inertia": None, "speed": None, "ramp": None}
+                    yield steps[later], place, winch, motor.model_copy(update=still), False
 
 
 # Drive and resistance by kind along a run, and the static margin between them by a standard.

@@ -404,3 +404,35 @@ def test_what_newton_refuses_is_its_last_residual() -> None:
     cables.roped.winches.turned[0] = 100.0
     with pytest.raises(ValueError, match="more is wound than there is rope"):
         cables.refuse(state.place.paths, state.rate.paths)
+
+
+@pytest.mark.parametrize("inertia", [None, 1e-7])
+def test_a_motor_that_holds_after_the_lock_is_what_it_was_before(inertia: float | None) -> None:
+    """It follows no command then: it has no lag, and no rotor that runs up; to hold the tension
+    takes what its load asks for.
+    """
+    values: dict[str, object] = {
+        "structure.sections": 4, "structure.opening_angle": 120.0, "solver.end_time": 12.0,
+        "solver.settling_time": 0.5, "record.interval": 0.25, "margin": "none",
+    }  # fmt: skip
+    for plane in ("upper", "lower"):
+        motor = {"speed": 200.0, "ramp": 3.0} | (
+            {} if inertia is None else {"rotor_inertia": inertia}
+        )
+        values |= {f"cables.{plane}.winch.winding.{name}": value for name, value in motor.items()}
+    stops, holds_on = (
+        simulate(
+            load_scene("ring18-motor").with_values(
+                values | {f"cables.{plane}.winch.after_lock": word for plane in ("upper", "lower")}
+            ),
+            "frame",
+        )
+        for word in ("stop", "hold")
+    )
+    assert stops.longest_motor_lag == holds_on.longest_motor_lag == 0.0
+    assert float(holds_on.peak_motor_power) == pytest.approx(
+        float(stops.peak_motor_power), rel=0.03
+    )
+    # Its stall torque is 5e-3 N m.
+    least, found = float(stops.peak_motor_torque), float(holds_on.peak_motor_torque)
+    assert least <= found < 1.2 * least
