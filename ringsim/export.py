@@ -190,7 +190,7 @@ def write_mat(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
 
     Beside the variables and coordinates ``units``, ``meaning`` and ``dimensions`` are structs with
     their words by name, ``attributes`` those of the dataset.  Words are cells; codes stay numbers,
-    with their words in ``codes``.
+    with their words in ``codes``.  A variable of such a name has "_" behind it.
 
     Raises
     ------
@@ -222,9 +222,11 @@ def write_mat(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
             named = zip(values, str(variable.attrs["flag_meanings"]).split(), strict=True)
             about["codes"][name] = ", ".join(f"{code:g} {word}" for code, word in named)
     attributes = {str(name)[:LONGEST_NAME]: value for name, value in dataset.attrs.items()}
+    about |= {"attributes": attributes}
+    content = {f"{name}_" if name in about else name: own for name, own in content.items()}
     with whole(path, lasting=False) as draft, draft.open("wb") as file:
         scipy.io.savemat(
-            file, content | about | {"attributes": attributes}, do_compression=True,
+            file, content | about, do_compression=True,
             long_field_names=True, oned_as="column",
         )  # fmt: skip
     return [path]

@@ -76,18 +76,18 @@ def notes(campaign: xr.Dataset) -> list[str]:
 
 def outcome_lines(campaign: xr.Dataset) -> list[str]:
     """What became of the antenna, and which runs failed: a line an end, with the first reason."""
+    if OUTCOME not in campaign:  # the file leaves it out
+        return []
     reasons = campaign["reason"].to_numpy() if "reason" in campaign else None
     return ending_lines(
-        campaign["outcome"].to_numpy(), campaign["status"].to_numpy(),
+        campaign[OUTCOME].to_numpy(), campaign["status"].to_numpy(),
         lambda sample: "" if reasons is None else str(reasons[sample]),
         opened(campaign) if "deployment_time" in campaign else None,
     )  # fmt: skip
 
 
 def opened(campaign: xr.Dataset) -> Mask:
-    """Which antennas have opened, however they ended: all V-joints have come to 180 deg, and the
-    latches of none of them have missed.
-    """
+    """Which antennas have opened, however they ended: all V-joints at 180 deg, no latch missed."""
     caught, come = (numbers(campaign, f"{name}_joints") for name in ("latched", "locked"))
     return np.asarray(np.isfinite(numbers(campaign, "deployment_time")) & ~(caught < come))
 

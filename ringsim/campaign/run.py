@@ -73,7 +73,7 @@ class Share:
         Share(number=2, count=8)
         """
         number, _, count = text.partition("/")
-        if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
+        if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
             raise InputError(f"--part {text}: must read i/n with 1 <= i <= n, for example 2/8")
         return cls(int(number), int(count))
 

@@ -251,8 +251,9 @@ class Commands(Output):
     def reduce(self, run: Run, series: Series) -> Values:
         """As it stands at the output times."""
         at = np.searchsorted(series.times, series.grid * (1.0 + 1e-12), side="right") - 1
-        shown = len(run.coordinates["winch"])
-        return {"winch_command": np.moveaxis(series.values[at, :, :shown], 0, -1)}
+        told = series.values[at, :, : len(run.coordinates["winch"])]
+        told[series.grid > series.times[-1] * (1.0 + 1e-12)] = np.nan
+        return {"winch_command": np.moveaxis(told, 0, -1)}
 
 
 def _electrical(series: Series, *courses: Array) -> Values:

@@ -133,10 +133,17 @@ def test_a_refused_median_is_told_as_what_it_is(tmp_path):
     assert "speed = 600.0 rad/s must be below" in str(refused.value)
 
 
-@for_each("part", ["0/2", "3/2", "2", "a/b", "-1/2", "1/0"])
+@for_each("part", ["0/2", "3/2", "2", "a/b", "-1/2", "1/0", "\N{SUPERSCRIPT TWO}/3"])
 def test_senseless_parts_are_refused(part, bench):
     printed = bench.run("campaign", bench.write(2), "--part", part, code=2)
     assert "must read i/n" in printed
+
+
+def test_a_file_may_leave_out_what_the_antenna_did(bench):
+    """The file was written, and then the command failed."""
+    bench.write(2, more='[output]\nleave_out = ["outcome"]\n')
+    bench.run("campaign", "small.toml", "--workers", 0, "--out", "out")
+    assert "outcome" not in bench.result("out")
 
 
 def test_output_is_rounded_and_left_out_where_asked(bench):

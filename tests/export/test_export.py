@@ -250,3 +250,12 @@ def test_a_title_of_hyphens_is_no_end_of_a_comment(run_file: Path) -> None:
     ElementTree.fromstring(text)
     for file in run_file.parent.glob("*-vtu/*.vtu"):
         ElementTree.parse(file)
+
+
+def test_a_variable_called_as_a_table_of_the_file_keeps_its_values(run_file: Path) -> None:
+    with netCDF4.Dataset(run_file, "a") as file:
+        file.createVariable("units", "f8")[...] = 7.0
+    export(run_file, "--format", "mat")
+    found = loadmat(run_file.with_suffix(".mat"), simplify_cells=True)
+    assert found["units_"] == 7.0
+    assert found["units"]["peak_tension"] == "N"
