@@ -135,9 +135,9 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
     if "reason" not in campaign:
         return []
     found, first = dict[str, dict[int, str]](), dict[str, dict[int, str]]()
-    held, reasons = good(campaign), campaign["reason"].to_numpy()
-    for sample in np.flatnonzero(held).tolist():
-        reason, *remarks = str(reasons[sample]).split("; ")
+    held, both = good(campaign), (campaign[name].to_numpy() for name in ("sample", "reason"))
+    for sample, told_of in zip(*(each[held].tolist() for each in both), strict=True):
+        reason, *remarks = str(told_of).split("; ")
         first.setdefault(_kind(reason), {})[sample] = reason
         for remark in remarks:
             if may_be_off(f"; {remark}")[0] or remark.startswith(_LATE):

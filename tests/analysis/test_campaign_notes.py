@@ -98,6 +98,8 @@ def test_remarks_of_runs_are_counted_and_the_first_is_quoted() -> None:
     lines = "\n".join(all_told(analyse(made)))
     assert " ".join(first.split()) in " ".join(lines.split())
     assert remark_lines(made_campaign(3)) == []
+    # A selection keeps the numbers of its samples.
+    assert ["sample 9:" in line for line in remark_lines(made.isel(sample=[9]))] == [True, True]
     # Also where it is the reason itself, and of rings of which only half came so far.
     one = "1 of 24 latches did not catch: upper 5"
     half = "2 of the 12 latches that were met did not catch: upper 5, lower 6"
