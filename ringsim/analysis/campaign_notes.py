@@ -407,15 +407,16 @@ def losses(campaign: xr.Dataset) -> Losses:
     return Losses(count, int(run.sum()), chance)
 
 
-def marked(table: Table, analysis: xr.Dataset, column: int = 0) -> Table:
-    """A table with the mark in one column of each row, but of those about lost runs, if an analysis
-    says that its statistics are bent.
+def marked(table: Table, analysis: xr.Dataset, column: int = 0, safe: Sequence[str] = ()) -> Table:
+    """A table with the mark in one column of each row, if an analysis says that its statistics are
+    bent; not in rows about lost runs and those that begin with what is ``safe``.
     """
     if not analysis.attrs.get(NOTE):
         return table
     rows, own = [], False
     for row in table.rows:
-        own = row[0].startswith(_OF_LOSSES) if row[0] else own  # a blank repeats the one above
+        # A blank repeats the one above.
+        own = row[0].startswith((_OF_LOSSES, *safe)) if row[0] else own
         mark = "" if own else MARK
         rows.append((*row[:column], f"{row[column]}{mark}", *row[column + 1 :]))
     return table._replace(rows=rows)

@@ -375,7 +375,8 @@ def _outputs(found: xr.Dataset) -> tuple[Table, list[str]]:
         apart = factor * found[f"{name}_difference"].item()
         low, high = factor * found[f"{name}_difference_interval"].values
         # That one has none, and how many the other has; or that of no pair both have one.
-        if not all(counts) or (np.isnan(apart) and np.isfinite([first, second]).all()):
+        where = found.get(f"{name}_largest_difference_sample")
+        if not all(counts) or (where is not None and where == -1):
             each = zip((first, second), counts, strict=True)
             cells = [number_text(value) if count else "none" for value, count in each]
             used = " and ".join(map(str, counts))

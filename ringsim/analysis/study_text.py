@@ -149,8 +149,9 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
     head = ("output", "unit", "statistic", "as drawn", "reweighted", "95 % interval",
             "effective samples", "that determine it")  # fmt: skip
     of_shares = ("probability of", "reweighted", "95 % interval", "samples that determine it")
-    tables = Table(head, rows), Table(of_shares, shares, notes)
-    found = [first, *(marked(table, analysis) for table in tables)]
+    kinds = analysis.get("kind", xr.DataArray([])).values.tolist()  # shares of all that ran
+    of_all = marked(Table(of_shares, shares, notes), analysis, safe=kinds)
+    found = [first, marked(Table(head, rows), analysis), of_all]
     return [*found, _verdicts(analysis)] if "reweighted_verdict" in analysis else found
 
 

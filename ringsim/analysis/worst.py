@@ -555,13 +555,10 @@ def _ratios(campaign: xr.Dataset) -> Iterator[tuple[str, str, str, Any, Array, A
         path = f"limits.{limit}"
         if peak not in campaign or (path not in scene and path not in own):
             continue
-        allowed: Any = (
-            float(scene[path])
-            if path not in own
-            else np.array(
-                [np.nan if v == "none" else float(v) for v in campaign[own[path]].values.tolist()]
-            )
-        )
+        allowed: Any = None if path in own else float(scene[path])
+        if allowed is None:
+            given = campaign[own[path]].values.tolist()
+            allowed = np.array([np.nan if each == "none" else float(each) for each in given])
         values = largest(campaign, peak, series)
         ratio = np.asarray(allowed / np.where(good(campaign) & (values > 0), values, np.nan) - 1.0)
         if np.isfinite(ratio).any():

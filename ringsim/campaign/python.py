@@ -169,7 +169,8 @@ class Campaign:
         retry_failed
             Whether samples that failed run again, too.
         settings
-            Solver and record settings, by scene path, of those that run again.
+            Solver and record settings, by scene path, of those that run again; with
+            ``retry_failed`` alone.
         part
             "I/N" runs every N-th sample alone, from the I-th on.
         executor

@@ -26,6 +26,7 @@ from ringsim.campaign.folder import (
     open_folder,
     opened_as,
     prepare_folder,
+    require_this_build,
 )
 from ringsim.campaign.merging import merge
 from ringsim.campaign.specification import SOLVERS, Campaign, campaign_of, load_campaign
@@ -427,6 +428,7 @@ class Order(NamedTuple):
                 f"{self.folder}: this folder has the campaign {held}, not {name}: choose another "
                 "folder with --out"
             )
+        require_this_build(begun)
         begun.survey()
         self._require_begun(begun)
         return False
@@ -442,7 +444,7 @@ class Order(NamedTuple):
         size = next((int(each[-1]) for each in sizes if each), None)
         settings = {name: json.loads(value) for name, value in called}
         plain = re.sub(r"^# called with .*$", "", text, flags=re.MULTILINE)
-        campaign = campaign_of(plain, self.campaign.file, settings, size)
+        campaign = campaign_of(plain, self.campaign.file, settings, size, self.campaign.scene)
         table = campaign.draw()
         opened_as(campaign, self.folder, table, self.solving)
         if table.samples > begun.table.samples:

@@ -57,15 +57,12 @@ def decided(campaign: Folder) -> End | None:
     if rule is None:
         return None
     judged = _Judge(campaign, rule)
-    try:
-        for count in judged.numbers:
-            told = judged.at(count)
-            if told is None:
-                return None
-            if told:
-                return End(count, told)
-    except InputError:  # a requirement that its samples do not tell of ends nothing
-        return None
+    for count in judged.numbers:
+        told = judged.at(count)
+        if told is None:
+            return None
+        if told:
+            return End(count, told)
     return None
 
 
@@ -127,7 +124,10 @@ class _Judge:
         columns |= {name: self._known[name] for name in self._present}
         dataset = self._empty.assign({n: ("sample", v) for n, v in columns.items()})
         dataset = dataset.assign_coords(sample=np.arange(count))
-        return holds(self._rule, dataset, self._requirements, self._placed)
+        try:
+            return holds(self._rule, dataset, self._requirements, self._placed)
+        except InputError:  # a requirement that these samples do not tell of ends nothing
+            return ""
 
 
 class Watch:
@@ -166,11 +166,7 @@ class Watch:
             if waits or time.monotonic() - self._asked < _PAUSE:
                 break
             count = self._numbers[self._next]
-            try:
-                told = self._judge.at(count)
-            except InputError:
-                told = ""
-            if told is None:
+            if (told := self._judge.at(count)) is None:
                 self._asked = time.monotonic()
                 break
             if told:

@@ -136,7 +136,7 @@ class Motors(Output):
         for steps, (plane, end), winch, motor, controlled in _motors(run, times):
             tension, speed, wound, told = series.values[:, plane, end].T
             ending = motor
-            if controlled and np.any(told != motor.commanded_speed()):
+            if controlled and np.any(told[steps] != motor.commanded_speed()):
                 # A step ends with the command with which it began.
                 ending, motor = (
                     motor.model_copy(update={"speed": each / motor.travel, "ramp": None})

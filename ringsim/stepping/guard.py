@@ -144,11 +144,11 @@ class Guard(Remembering):
         self._lost = self._driven = self._credit = 0.0
         self._low, self._high = [math.inf] * 4, [-math.inf] * 4
         self._worst = (0.0, 0.0)
-        self._behind = False
+        self._behind = 0
 
     def go_on_with_constant_steps(self) -> None:
         """Judge them from here on: those before were of another kind."""
-        self._behind = True
+        self._behind = len(self._run)
 
     def judge(self, now: Instant) -> Reason:
         """Why the run must stop here: cause, measured value, bound and cure; empty if not."""
@@ -213,8 +213,8 @@ class Guard(Remembering):
         reason = self._unbalanced(*self._worst, least, 1.0, "solver.energy_tolerance")
         if reason or not self._constant:
             return reason
-        run = self._run[1:] if self._behind else self._run
-        return unresolved(run, self._scales.slack_tension, from_rest=not self._behind)
+        run, from_rest = self._run[self._behind :], not self._behind
+        return unresolved(run, self._scales.slack_tension, from_rest=from_rest)
 
     def _ranges(self) -> list[float]:
         return [high - low for low, high in zip(self._low, self._high, strict=True)]

@@ -109,7 +109,7 @@ def test_a_bound_may_have_its_unit_and_no_other(study):
     )
     assert "deployment_time <= 12 s" in found.output
     for words, told in (
-        ("max 12 ms, probability 0.5, confidence 0.9", "max = 12 ms: give it in s"),
+        ("max 12 N, probability 0.5, confidence 0.9", "max = 12 N: give it in s"),
         ("max 12, probability 0.5 s, confidence 0.9", "0.5 s: give it without a unit"),
     ):
         with pytest.raises(InputError, match=told):

@@ -243,3 +243,15 @@ def test_replay_refuses_checks_that_a_campaign_does_not_have() -> None:
 def test_settings_alone_are_refused_with_what_they_are_for() -> None:
     with pytest.raises(InputError, match=r"settings: solver\.step: .* give retry_failed=True, too"):
         small().run(workers=0, settings={"solver.step": 0.1})
+
+
+def test_failed_samples_of_a_scene_of_the_script_run_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = ringsim.load_scene("ring18").with_values(TABLE["set"] | {"solver.end_time": 15.0})
+
+    def own() -> Campaign:
+        return small(scene=scene, set={})
+
+    with monkeypatch.context() as patched:
+        patched.setattr(fake_solver, "run", lambda scene: 1 / 0)
+        own().run(workers=0)
+    assert (own().run(workers=0, retry_failed=True)["status"] == 0).all()
