@@ -74,8 +74,9 @@ def test_every_line_that_lost_runs_bend_is_marked(full):
     assert len(rows) > 12
     for line in rows:
         assert (MARK in line) != line.startswith(SAFE), line
-    (deployed,) = (line for line in rows if line.startswith("deployed ") and "(few)" not in line)
+    deployed, reweighted = (line for line in rows if line.startswith("deployed "))
     assert "334 of 400 (66 failed)" in deployed
+    assert re.search(r"0\.\d+ +0\.\d+ \.\. 1", reweighted)
 
 
 def test_runs_lost_at_random_bend_nothing_and_are_named():
