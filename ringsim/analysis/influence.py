@@ -503,7 +503,7 @@ def often(campaign: xr.Dataset) -> xr.Dataset:
     been apart.
     """
     needed = [f"asynchrony_{who}_{dim}" for who in _WHO for dim in ("plane", "section")]
-    if absent := [name for name in needed if name not in campaign]:
+    if absent := [name for name in (*needed, "plane", "section") if name not in campaign]:
         raise InputError(
             f"leader: needs {absent[0]}, which this campaign has not recorded, or which its "
             "fidelity does not compute"

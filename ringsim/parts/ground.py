@@ -121,7 +121,7 @@ class Offload(Model):
     Every chosen corner's line carries its hinge assembly and an equal share of all that hangs
     between the chosen corners, less ``residual`` of both; where the base is fixed, it carries the
     share of its own corner.  A line pulls with T = that + stiffness * drop, and its trolley
-    follows at once: the corner feels its mass along the grid, and friction * T against its
+    follows at once: the corner feels its mass along the grid, and friction * |T| against its
     velocity v there, smooth below ``friction_speed``: v / sqrt(|v|^2 + friction_speed^2).
     """
 
@@ -175,7 +175,7 @@ class Offload(Model):
         tension = lifts + self.stiffness * drop
         across = rates - (rates @ up)[:, None] * up
         speed = np.sqrt(np.sum(across**2, axis=1) + self.friction_speed**2)
-        friction = -(self.friction * tension / speed)[:, None] * across
+        friction = -(self.friction * np.abs(tension) / speed)[:, None] * across
         stored = 0.5 * self.stiffness * float(drop @ drop)
         return Hold(tension[:, None] * up + friction, friction, stored)
 
@@ -189,5 +189,7 @@ class Offload(Model):
         speed = np.sqrt(np.sum(across**2, axis=1) + self.friction_speed**2)
         along = across / speed[:, None]
         bent = (level - along[:, :, None] * along[:, None, :]) / speed[:, None, None]
-        found = -self.stiffness * (up - self.friction * along)[:, :, None] * up
-        return np.asarray(found - (self.friction * tension)[:, None, None] * rate_by_place * bent)
+        # Where a line pushes its trolley does not drive it.
+        pressed, rises = self.friction * np.abs(tension), self.friction * np.sign(tension)[:, None]
+        found = -self.stiffness * (up - rises * along)[:, :, None] * up
+        return np.asarray(found - pressed[:, None, None] * rate_by_place * bent)

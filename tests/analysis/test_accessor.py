@@ -152,3 +152,10 @@ def test_notebooks_show_what_a_dataset_can_be_asked(campaign: xr.Dataset) -> Non
     assert text.startswith("<p>ring of a campaign</p>")
     assert text.count("<tr>") == repr(campaign.ring).count("()")
     assert "Which V-joint is most open and which least." in text
+
+
+def test_who_leads_is_refused_of_a_campaign_without_records() -> None:
+    """As where all runs have failed."""
+    made = made_campaign(3).drop_dims("plane")
+    with pytest.raises(InputError, match="leader: needs plane"):
+        made.ring.leader()

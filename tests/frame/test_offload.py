@@ -109,3 +109,25 @@ def test_a_trolley_rubs_along_the_grid() -> None:
     assert hold.friction[0] == pytest.approx(-0.1 * tension * np.array([0.6, -0.8, 0.0]), rel=1e-9)
     assert hold.force[0, 2] == pytest.approx(tension)
     assert hold.stored == pytest.approx(0.5 * 5.0 * 0.1**2)
+
+
+@pytest.mark.parametrize("lift", [30.0, -0.77])
+def test_a_trolley_brakes_whichever_way_its_line_pulls(lift: float) -> None:
+    """A line with a stiffness may push; its trolley takes energy all the same, and the tangent is
+    that of differences.
+    """
+    law, up = Offload(stiffness=10.0, friction=0.2, friction_speed=0.05), np.array([0.0, 0.0, 1.0])
+    lifts, rate_by_place, step = np.array([lift]), 200.0, 1e-6
+    moved, rates = np.array([[0.01, 0.02, 0.03]]), np.array([[0.03, -0.04, 0.1]])
+    hold = law.hold(up, lifts, moved, rates)
+    assert float(hold.friction[0] @ rates[0]) < 0.0
+    found = law.slopes(up, lifts, moved, rates, rate_by_place)[0]
+    for axis in range(3):
+        by = step * np.eye(3)[axis]
+        ahead, behind = (
+            law.hold(up, lifts, moved + s * by, rates + s * rate_by_place * by).force[0]
+            for s in (1.0, -1.0)
+        )
+        np.testing.assert_allclose(
+            found[:, axis], (ahead - behind) / (2.0 * step), rtol=1e-5, atol=1e-5
+        )
