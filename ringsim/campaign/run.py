@@ -507,8 +507,14 @@ def _start(scheduler: Scheduler, order: Callable[[], Order], then: Callable[[Pat
                 raise placed
             folder, chosen = placed
             how = Choices(scheduler, *chosen)
-            code = run_campaign(folder, how)
-            if not how.more or scheduler.from_first(code) != EXIT_DONE:
+            code: Any
+            try:
+                code = run_campaign(folder, how)
+            except InputError as error:  # of the first rank alone, as of a merge
+                code = error
+            if isinstance(code := scheduler.from_first(code), InputError):
+                raise code
+            if not how.more or code != EXIT_DONE:
                 break
         if first:
             then(folder)
