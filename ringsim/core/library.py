@@ -232,7 +232,7 @@ def _packed(table: Any) -> _Packed:
 
 
 @cache
-def _kinds(kind: type) -> tuple[Any, ...]:
+def _annotations(kind: type) -> tuple[Any, ...]:
     """Annotations of a kind of table."""
     return tuple(get_type_hints(kind).values())
 
@@ -240,12 +240,12 @@ def _kinds(kind: type) -> tuple[Any, ...]:
 @cache
 def _fields(kind: type) -> list[str]:
     """What the fields of a kind of table are, as of ``_FUNCTIONS``."""
-    return [_KINDS.get(each, "t") for each in _kinds(kind)]
+    return [_KINDS.get(each, "t") for each in _annotations(kind)]
 
 
 def words_of(kind: type) -> int:
     """Words of a kind of table."""
-    nested = iter(each for each in _kinds(kind) if each not in _KINDS)
+    nested = iter(each for each in _annotations(kind) if each not in _KINDS)
     each = {"a": 3, "n": 3, "r": 1, "w": 1}
     return sum(each.get(letter) or words_of(next(nested)) for letter in _fields(kind))
 
@@ -256,7 +256,7 @@ Table = TypeVar("Table", bound=tuple[Any, ...])
 def empty_of(kind: type[Table]) -> Table:
     """A table whose arrays have no rows, and whose numbers are zero: of what a scene has not."""
     kinds = {"a": np.zeros(0), "n": np.zeros(0, np.int64), "r": 0.0, "w": 0}
-    found = (kinds[_KINDS[k]] if k in _KINDS else empty_of(k) for k in _kinds(kind))
+    found = (kinds[_KINDS[k]] if k in _KINDS else empty_of(k) for k in _annotations(kind))
     return cast(Table, cast(Any, kind)(*found))
 
 

@@ -15,7 +15,8 @@ from ringsim.core.library import call
 # Geometry.  L_i and u_i (away from the winch) from the points; the angle between the pulls -u_j-1
 # and u_j is a_j = 2 atan2(\|u_j-1 + u_j\|, \|u_j - u_j-1\|), exact near 0 and pi.
 #
-# Stretch.  S = sum L_i, natural length M = content - wound, mean strain e = (S - M) / M (paper
+# Stretch.  S = sum L_i, natural length M = content - wound (of a parted rope the content: its winch
+# winds what holds nothing), mean strain e = (S - M) / M (paper
 # 001's element).  Mean tension q = b ln(1 + exp(y / b)) with y = EA (e + t_d de/dt): smooth in
 # slack; de/dt = (dS/dt + (S / M) w) / M with w the rate of winding.  Above y = 10 b the tension
 # exceeds y by less than 5e-5 b, below y = -10 b it is less than that; its energy is the integral of

@@ -322,8 +322,8 @@ class Storing(Integration):
         if np.array_equal(own.point_arm, before.point_arm):
             return None
         refused = InputError(
-            f"{start.name}: a body had no mass around its origin, or has none any more, so that "
-            "its turning would begin anew: start from the beginning"
+            f"{start.name}: the masses of a body spread in a direction in which they had no "
+            "extent, or no longer do, so that how they moved there is not known: begin anew"
         )
         if not np.array_equal(own.point_frame, before.point_frame):
             raise refused

@@ -185,6 +185,17 @@ def test_parts_check_their_own_samples(bench):
     assert bench.result("out").status_checked.values.tolist() == [0, -1, 0, -1, 0]
 
 
+def test_no_figures_are_drawn_while_a_check_is_left(bench):
+    """That of another part, or behind a signal: the exit code stays that of the run."""
+    written(bench)
+    bench.run(*START, "--part", "1/2")
+    lose(bench, [check_of(2)])
+    bench.run(*START, "--part", "2/2", "--plot", code=0)
+    assert not list((bench.folder / "out").glob("*.png"))
+    bench.run(*START, "--plot")
+    assert list((bench.folder / "out").glob("*.png"))
+
+
 @for_each(
     ("top", "words"),
     [

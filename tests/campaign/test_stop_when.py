@@ -107,17 +107,21 @@ def test_without_enough_samples_it_runs_to_its_end_and_says_so(bench):
     assert "did not end the campaign of 40 samples (3 looks: 16, 24, 36)" in printed
 
 
+def write_drawn(bench, design, inputs):
+    """A campaign that fails as its inputs say, see ``fake_solver.poisoned``."""
+    path = bench.write_listed([30])
+    listed = 'design = { kind = "list", file = "ways.csv" }'
+    path.write_text(path.read_text().replace(listed, design) + inputs)
+
+
 def test_samples_that_failed_once_are_judged_again(bench):
     """All fail at first, which shows nothing; once they hold, the first look is enough."""
-    path = bench.write_listed([30])
-    path.write_text(
-        path.read_text().replace(
-            'design = { kind = "list", file = "ways.csv" }',
-            'design = { kind = "random", samples = 60 }\n'
-            'stop_when = { of = "deployment_time", half_width = 3.0 }\nlooks = { first = 20 }\n',
-        )
-        + '[inputs]\n"loads.force" = { kind = "uniform", low = 0.01, high = 0.05 }\n'
-        + '"rods.poisson_ratio" = { kind = "discrete", values = [0.11, 0.3] }\n'
+    write_drawn(
+        bench,
+        'design = { kind = "random", samples = 60 }\n'
+        'stop_when = { of = "deployment_time", half_width = 3.0 }\nlooks = { first = 20 }\n',
+        '[inputs]\n"loads.force" = { kind = "uniform", low = 0.01, high = 0.05 }\n'
+        '"rods.poisson_ratio" = { kind = "discrete", values = [0.11, 0.3] }\n',
     )
     start = ("campaign", "listed.toml", "--workers", 0, "--out", "out")
     bench.run(*start, solver="fake_solver:poisoned")
@@ -162,16 +166,13 @@ def test_rules_that_cannot_be_followed_are_refused(change, words, tmp_path):
 
 def test_a_look_at_samples_without_numbers_ends_nothing(bench):
     """All of the first look have failed: the campaign goes on, as its resumption would."""
-    path = bench.write_listed([30])
-    path.write_text(
-        path.read_text().replace(
-            'design = { kind = "list", file = "ways.csv" }',
-            'design = { kind = "random", samples = 24 }\n'
-            'stop_when = { requirement = "deployment_time" }\nlooks = { first = 8 }\n',
-        )
-        + '[inputs]\n"rods.poisson_ratio" = { kind = "discrete", values = [0.12] }\n'
-        + "[requirements]\n"
-        "deployment_time = { max = 15.0, probability = 0.5, confidence = 0.9 }\n"
+    write_drawn(
+        bench,
+        'design = { kind = "random", samples = 24 }\n'
+        'stop_when = { requirement = "deployment_time" }\nlooks = { first = 8 }\n',
+        '[inputs]\n"rods.poisson_ratio" = { kind = "discrete", values = [0.12] }\n'
+        "[requirements]\n"
+        "deployment_time = { max = 15.0, probability = 0.5, confidence = 0.9 }\n",
     )
     start = ("campaign", "listed.toml", "--workers", 0, "--out", "out")
     bench.run(*start, solver="fake_solver:poisoned", code=3)

@@ -40,8 +40,9 @@ def gone_on(folder: Path, first: dict[str, Any], change: dict[str, Any]) -> xr.D
         ({"spacecraft": CRAFT}, {"spacecraft.mass": 600.0}),
         ({"spacecraft": CRAFT}, {"spacecraft.inertia": [150.0, 150.0, 150.0]}),
         ({"spacecraft": CRAFT}, {"spacecraft.centre": [0.1, 0.0, 0.0]}),
+        ({"spacecraft": CRAFT | {"inertia": [50.0, 50.0, 100.0]}}, {"spacecraft": CRAFT}),
     ],
-    ids=["hinge", "corner", "boom", "mass", "inertia", "centre"],
+    ids=["hinge", "corner", "boom", "mass", "inertia", "centre", "flat"],
 )
 def test_other_masses_move_as_the_bodies_did(
     first: dict[str, Any], change: dict[str, Any], tmp_path: Path
@@ -52,6 +53,13 @@ def test_other_masses_move_as_the_bodies_did(
     found = gone_on(tmp_path, first, change)
     assert found["status"] == Status.OK
     assert found["energy_error"] < 3e-4
+
+
+def test_masses_of_another_extent_are_refused(tmp_path: Path) -> None:
+    """A mass in one point is one point that is followed, and a body four."""
+    point = {"spacecraft": CRAFT | {"inertia": [1e-16, 1e-16, 1e-16]}}
+    with pytest.raises(InputError, match="spread in a direction in which they had no extent"):
+        gone_on(tmp_path, point, {"spacecraft.inertia": [100.0, 100.0, 100.0]})
 
 
 def test_lengths_that_a_temperature_changes_are_another_structure(tmp_path: Path) -> None:

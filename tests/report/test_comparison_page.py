@@ -504,3 +504,9 @@ def test_of_cases_courses_show_the_base_case_and_the_range(
     told = figure.legends[0].get_title().get_text()
     assert "Lines are the base case" in told
     assert "Each line is the sample whose asynchrony_max is the median" in told  # of the other
+
+
+def test_a_campaign_without_records_has_a_page() -> None:
+    """As where all its runs have failed: it has no courses, and ended with a traceback."""
+    both = made_campaign(4), made_campaign(4).drop_dims("time")
+    assert "</html>" in comparison_page(compare(*both), *both)
