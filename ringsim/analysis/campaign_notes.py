@@ -79,9 +79,9 @@ def outcome_lines(campaign: xr.Dataset) -> list[str]:
     if OUTCOME not in campaign:  # the file leaves it out
         return []
     reasons = campaign["reason"].to_numpy() if "reason" in campaign else None
+    fates, status, samples = (campaign[name].to_numpy() for name in (OUTCOME, "status", "sample"))
     return ending_lines(
-        campaign[OUTCOME].to_numpy(), campaign["status"].to_numpy(),
-        lambda sample: "" if reasons is None else str(reasons[sample]),
+        fates, status, samples, lambda place: "" if reasons is None else str(reasons[place]),
         opened(campaign) if "deployment_time" in campaign else None,
     )  # fmt: skip
 
@@ -93,11 +93,11 @@ def opened(campaign: xr.Dataset) -> Mask:
 
 
 def ending_lines(
-    fates: NDArray[Any], status: NDArray[Any], reason_of: Callable[[int], str],
-    opened: NDArray[Any] | None = None,
+    fates: NDArray[Any], status: NDArray[Any], samples: NDArray[Any],
+    reason_of: Callable[[int], str], opened: NDArray[Any] | None = None,
 ) -> list[str]:  # fmt: skip
-    """The same from codes of every sample and what finds the reason of one, "" if it is lost; and
-    from which have ``opened``, where that is known, since an overloaded ring may have.
+    """The same from codes and numbers of all samples and what finds the reason at a place, "" if it
+    is lost; and from which have ``opened``, where that is known, since an overloaded ring may have.
 
     Counts are of the samples that have run.
     """
@@ -105,14 +105,15 @@ def ending_lines(
     run = int(np.sum(words != NOT_RUN))
     for word in kinds_of_ends(words):
         own = np.flatnonzero(words == word)
+        called = samples[own].tolist()
         why = "" if word in (*REACHED, UNKNOWN) else without_doubts(reason_of(int(own[0])))
         if word.startswith(LOST):
-            told = f", first sample {own[0]}"
+            told = f", first sample {called[0]}"
         else:
             more = ", ..." if len(own) > _NAMED else ""
-            told = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, own[:_NAMED]))}{more})"
+            told = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, called[:_NAMED]))}{more})"
         if why and len(own) > 1 and not word.startswith(LOST):
-            why = f"sample {own[0]}: {why}"
+            why = f"sample {called[0]}: {why}"
         told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
         told = "" if word in REACHED else told
         over = word in [each.words for each in GO_ON]
@@ -147,10 +148,9 @@ def remark_lines(campaign: xr.Dataset) -> list[str]:
                 remark = remark.removesuffix(")")
             found.setdefault(_kind(remark), {}).setdefault(sample, remark)
     whole = [sorted((own | first.get(kind, {})).items()) for kind, own in found.items()]
-    every = int(held.sum())
     return [
-        f"in {_of(len(own), every)}, {'for example in ' * (len(own) > 1)}sample {own[0][0]}: "
-        f"{own[0][1]}"
+        f"in {_of(len(own), int(held.sum()))}, {'for example in ' * (len(own) > 1)}sample "
+        f"{own[0][0]}: {own[0][1]}"
         for own in sorted(whole, key=len, reverse=True)
     ]
 

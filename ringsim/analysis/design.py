@@ -78,10 +78,12 @@ def population_of(campaign: xr.Dataset) -> xr.Dataset:
     The other runs of a block repeat most of their values; in statistics they would count as if they
     were more antennas.
     """
-    blocks = blocks_of(campaign)
-    if blocks is None or not blocks.of_indices:
+    if BLOCK_ROW not in campaign:
         return campaign
-    return campaign.isel(sample=np.flatnonzero(np.isin(blocks.rows.ravel(), ["A", "B"])))
+    rows = campaign[BLOCK_ROW].to_numpy().astype(str)  # also those of a part of a block
+    drawn = np.isin(rows, ["A", "B"])
+    of_indices = drawn | np.char.startswith(rows, "AB: ") | np.char.startswith(rows, "BA: ")
+    return campaign.isel(sample=np.flatnonzero(drawn)) if of_indices.all() else campaign
 
 
 # How the samples of a campaign were placed, as far as it decides which statistics they allow.

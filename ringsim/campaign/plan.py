@@ -20,14 +20,21 @@ from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.analysis.design import placement_of
 from ringsim.analysis.intervals import quantities, samples_needed
 from ringsim.analysis.requirements import Requirement, doubt_of
-from ringsim.campaign.folder import Folder, digests, opened_as, other_build
+from ringsim.campaign.folder import (
+    FAILED,
+    Folder,
+    digests,
+    open_folder,
+    opened_as,
+    other_build,
+)
 from ringsim.campaign.merging import is_behind
 from ringsim.campaign.run import Order, grown, growth_told
 from ringsim.campaign.watch import End, decided, looks_of, named
 from ringsim.choice import kind_of
 from ringsim.execution.slot import Local
 from ringsim.execution.work import FULL, Array, Work, relative_cost
-from ringsim.files import MERGED
+from ringsim.files import DESIGN, MERGED
 from ringsim.refusal import show
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.designs.blocks import Grouped
@@ -60,11 +67,18 @@ def plan(order: Order, workers: int, say: Callable[[str], None] = lambda line: N
     """
     order.check()
     campaign, share = grown(order.campaign, order.folder), order.share
-    table = campaign.draw()
-    old = opened_as(campaign, order.folder, table, order.solving)
+    if order.again and (order.folder / DESIGN).exists():
+        order.prepare()  # which only reads what has begun
+        old: Folder | None = open_folder(order.folder)
+        table = open_folder(order.folder).table
+    else:
+        table = campaign.draw()
+        old = opened_as(campaign, order.folder, table, order.solving)
     run_with = [""] * table.samples if old is None else digests(table, old.attributes)
     found = survey(order.folder, run_with)
-    todo = found.missing[share.holds(found.missing)]
+    codes = [*(FAILED if order.again else ()), *([] if order.overrides else [NO_CODE])]
+    todo = np.flatnonzero(np.isin(found.status, codes))
+    todo = todo[share.holds(todo)]
     design = campaign.specification.design
     lines = [
         f"{campaign.specification.name}: {counted(table.samples, 'sample')} ({kind_of(design)} "
@@ -358,7 +372,10 @@ def status_lines(campaign: Folder) -> list[str]:
         *([f"  runs           {growth}"] if growth else []),
         *(f"  {words[code]:<14} {counts[code]}" for code in words if counts[code]),
     ]
-    endings = ending_lines(found.fate, found.status, lambda k: next(found.results([k])).reason)
+    numbers = np.arange(len(found.status))
+    endings = ending_lines(
+        found.fate, found.status, numbers, lambda sample: next(found.results([sample])).reason
+    )
     lines += [f"  {line}" for line in endings]
     if every := len(campaign.checked):
         lines.append(f"  checked        {every - len(campaign.unchecked())} of {every}")

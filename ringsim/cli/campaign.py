@@ -27,7 +27,7 @@ from ringsim.cli.options import (
 )
 from ringsim.execution.mpi import launched_size
 from ringsim.execution.work import load_solver, solve
-from ringsim.files import require_file
+from ringsim.files import MERGED, require_file
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.balance import rules
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, InputError, show
@@ -93,7 +93,11 @@ def campaign_command(
     def draw(folder: Path) -> None:
         # As long as samples or checks are left, or are not merged, a file would be an older one.
         held = as_decided(open_folder(folder)) if plot else None
-        if held is None or len(held.survey().missing) or len(held.unchecked()) or is_behind(folder):
+        if held is None or len(held.survey().missing) or len(held.unchecked()):
+            return
+        if is_behind(folder):
+            told = f"{folder / MERGED} is older than the results: no figures before ringsim merge"
+            click.echo(f"{told} {folder}", err=True)
             return
         from ringsim.analysis.design import open_stored
 

@@ -82,11 +82,11 @@ def _write_with_schema(text: str, out: Path) -> None:
     from ringsim.reference.tree import schema_of  # reads every record of the package
 
     require_place(out)
-    schema = out.with_name(SCHEMA)
-    for path, content in (
-        (out, f"#:schema {SCHEMA}\n{text}"),
-        (schema, json.dumps(schema_of("scene"), indent=1) + "\n"),
-    ):
+    text = f"#:schema {SCHEMA}\n{text}"
+    if out.exists() and out.read_bytes() != text.encode():
+        raise InputError(f"--out {out}: this file is there, with other content: remove it first")
+    schema = json.dumps(schema_of("scene"), indent=1) + "\n"
+    for path, content in ((out, text), (out.with_name(SCHEMA), schema)):
         write_text(path, content)
         click.echo(f"wrote {path}")
 
@@ -126,8 +126,7 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
         click.echo(f"structure.opening_angle = {angle:.6g} deg: the ring deploys in {time:g} s")
         return
     if margin:
-        for text in margin_lines(substituted(loaded)):
-            click.echo(text)
+        click.echo("\n".join(margin_lines(substituted(loaded))))
         return
     told = {label: text for label, text in _summary(loaded).items() if text}
     wide = max(map(len, told)) + 2
@@ -145,10 +144,9 @@ def check_command(scene: str, settings: dict[str, Any], time: float | None, marg
         from ringsim.frame.model import try_laws
 
         try_laws(loaded)
-    lacking = _lacking(loaded)
     outside = loaded.controller is not None and loaded.controller.outside
     how = "ringsim.steps in Python steps it" if outside else "ringsim run FILE runs it"
-    click.echo(f"valid{lacking}: {how}")
+    click.echo(f"valid{_lacking(loaded)}: {how}")
 
 
 def _lacking(scene: Scene) -> str:
@@ -552,7 +550,9 @@ def explain_command(names: tuple[str, ...], schema: str | None, imports: tuple[s
     refused = False
     for name in names or known:
         try:
-            click.echo(explained(known[name]) if name in known else _key(name, known))
+            own = name.removesuffix("_checked")
+            told = explained(known[own]) if own in known else _key(name, known)
+            click.echo(f"{name}, of checks: " * (name != own) + told)
         except InputError as error:  # the others are explained all the same
             click.echo(str(error), err=True)
             refused = True

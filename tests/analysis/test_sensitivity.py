@@ -290,6 +290,18 @@ def test_statistics_are_of_the_samples_that_stand_for_the_population():
     assert low < 3.5 < high
 
 
+def test_a_part_of_the_blocks_counts_those_of_the_population_alone():
+    """Also samples that are no whole blocks: the others repeat most of their values."""
+    made = drawn_campaign(Saltelli(samples=16), response, 3, 1)
+    rows = made.block_row.values
+    for part in (made.isel(sample=slice(0, 43)), made.isel(sample=rows == "A"), made):
+        own = np.isin(part.block_row.values, ["A", "B"])
+        expected = part.asynchrony_max.values[own].mean()
+        found = analyse(part)
+        assert found.asynchrony_max.sel(statistic="mean").item() == pytest.approx(expected)
+        assert found.asynchrony_max_samples.values[0] == own.sum()
+
+
 def moved(design, function, seed):
     made = drawn_campaign(design, function, 3, seed)
     blocks = blocks_of(made)

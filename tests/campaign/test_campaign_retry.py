@@ -49,6 +49,16 @@ def test_failed_samples_run_again_with_other_settings(bench):
     assert "3 of 5 samples done, 2 left" not in poisoned(bench)  # the plain command goes on as ever
 
 
+def test_a_dry_run_counts_the_samples_that_would_run_again(bench):
+    bench.write_listed([30, 12, 30, 12])
+    poisoned(bench)
+    lose(bench, [2])
+    before = journals(bench)
+    for words, count in (((), 1), (("--retry-failed",), 3), (BETTER, 2)):
+        assert f"4 samples (list design), {count} to run" in poisoned(bench, *words, "--dry-run")
+    assert journals(bench) == before
+
+
 def test_samples_that_have_not_run_are_left_to_the_plain_command(bench):
     bench.write_listed([30, 12, 30])
     poisoned(bench)

@@ -86,6 +86,9 @@ def test_defaults_are_those_of_a_scene_that_leaves_them_out() -> None:
     assert f"default {scene.limits.rope_strain:g}" in explain("limits.rope_strain")
     assert f"default {scene.cables.upper.damping_time:g}" in explain("cables.upper.damping_time")
     assert "left out by default" in explain("cables.upper.slip_speed")
+    for name in ("peak_tension", "status"):
+        of_check = explain(f"{name}_checked")
+        assert of_check == f"{name}_checked, of checks: {explain(name)}"
     assert "must be given" in explain("cables.upper.winch")
 
 

@@ -14,6 +14,7 @@ from loops import for_each
 
 from ringsim.cli import cli
 from ringsim.reference.tree import schema_of
+from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
 
 pytestmark = pytest.mark.quick
@@ -146,6 +147,12 @@ def test_a_printed_scene_stands_beside_the_schema_that_it_names(tmp_path: Path) 
     beside = tmp_path / directive.removeprefix("#:schema ")
     assert json.loads(beside.read_text(encoding="utf-8")) == schema_of("scene")
     assert load_scene(out) == load_scene("ring18")
+    edited = out.read_text(encoding="utf-8") + "# mine\n"
+    out.write_text(edited, encoding="utf-8")
+    done = CliRunner().invoke(cli, ["scenes", "ring18", "--out", str(out)])
+    assert isinstance(done.exception, InputError)
+    assert "with other content: remove it first" in str(done.exception)
+    assert out.read_text(encoding="utf-8") == edited
 
 
 @for_each(
