@@ -239,6 +239,13 @@ class CableFault(Fault):
         """The ropes after the fault is cleared; ValueError if it cannot be."""
         raise NotImplementedError
 
+    @property
+    def held(self) -> tuple[int, int] | None:
+        """Cable and pulley at which it holds the rope, None if it holds none: as long as another
+        fault holds it there, clearing this one frees nothing.
+        """
+        return None
+
 
 # A cable that breaks.
 
@@ -283,6 +290,11 @@ class JammedPulley(CableFault):
         """Let the rope slip again: both parts become one."""
         return ropes.unjam(self.cable - 1, self.pulley - 1)
 
+    @property
+    def held(self) -> tuple[int, int] | None:
+        """See ``CableFault``."""
+        return self.cable, self.pulley
+
 
 # A rope that leaves its pulley.
 
@@ -317,3 +329,8 @@ class OffSheave(CableFault):
             f"faults: the rope of cable {self.cable} that left its pulley at {self.time:g} s "
             "cannot be undone: keep that fault, or start from an earlier state (--at)"
         )
+
+    @property
+    def held(self) -> tuple[int, int] | None:
+        """See ``CableFault``."""
+        return (self.cable, self.pulley) if self.rope == "wedged" else None

@@ -371,7 +371,11 @@ class Storing(Integration):
             np.pi - self._control.now.angles,
             ropes,
         )
+        struck = struck_by(self._scene.faults, start.time)
+        kept = {each.held for each in struck if isinstance(each, CableFault)} - {None}
         for fault in gone:
+            if isinstance(fault, CableFault) and fault.held in kept:
+                continue
             try:
                 fault.clear(own)
             except ValueError as error:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.cli import cli
 from ringsim.dataset import save
@@ -177,6 +178,23 @@ def test_a_cleared_fault_lets_go(tmp_path: Path) -> None:
     assert (lost[0][:5] == lost[1][:5]).all()
     assert lost[1][5] > 2.0 * lost[0][5]
     assert freed["energy_error"].item() < 1e-3
+
+
+@for_each("freed", ["jammed-pulley", "off-sheave"])
+def test_a_rope_that_two_faults_hold_at_a_pulley_slips_when_both_are_cleared(
+    tmp_path: Path, freed: str
+) -> None:
+    faults = [
+        {"kind": kind, "cable": 1, "pulley": 2, "time": 0.004}
+        for kind in ("jammed-pulley", "off-sheave")
+    ]
+    held, file = stored(truss(faults=faults), tmp_path)
+    start, left = read_state(file, 0.01), [each for each in faults if each["kind"] != freed]
+    one, none = (simulate(truss(faults=each), start=start) for each in (left, []))
+    for name in ("cable_tension", "opening_angle"):
+        np.testing.assert_allclose(one[name], held[name], rtol=1e-3, atol=1e-3, err_msg=name)
+    apart = np.abs(none["cable_tension"] - held["cable_tension"]).max()
+    assert apart.item() > 0.1 * held["peak_tension"].item()
 
 
 def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from loops import for_each
 
 from ringsim.cli import cli
 from ringsim.reference.tree import schema_of
-from ringsim.refusal import InputError
+from ringsim.refusal import EXIT_BAD_INPUT
 from ringsim.scene import builtin_scenes, load_scene
 
 pytestmark = pytest.mark.quick
@@ -150,8 +150,8 @@ def test_a_printed_scene_stands_beside_the_schema_that_it_names(tmp_path: Path) 
     edited = out.read_text(encoding="utf-8") + "# mine\n"
     out.write_text(edited, encoding="utf-8")
     done = CliRunner().invoke(cli, ["scenes", "ring18", "--out", str(out)])
-    assert isinstance(done.exception, InputError)
-    assert "with other content: remove it first" in str(done.exception)
+    assert done.exit_code == EXIT_BAD_INPUT
+    assert "with other content: remove it first" in done.stderr
     assert out.read_text(encoding="utf-8") == edited
 
 
