@@ -309,9 +309,8 @@ class Storing(Integration):
         # that other loads do no work.
         after = now.energies
         lost = before.kinetic + before.elastic - after.kinetic - after.elastic
-        energies = after._replace(lost=before.lost + lost, driven=before.driven)
-        self.history.forget_last()
-        self._control.begin_anew(self._read(replace(now, energies=energies)), lost)
+        now = replace(now, energies=after._replace(lost=lost, driven=0.0))
+        self._control.begin_anew(self._read(now, arrived=False), lost)
         self._latch(start.time)
 
     def _points_of(self, start: StoredState) -> Array | None:

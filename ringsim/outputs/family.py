@@ -112,13 +112,15 @@ class Run:
         """See the function of this name."""
         return slowest_period(self.layout or layout_of(self.scene))
 
-    def stretches(self) -> list[tuple[NDArray[np.intp], Scene]]:
-        """Numbers of the steps that a scene held for, and this scene, one after the other.
+    def stretches(self, times: Array) -> list[tuple[NDArray[np.intp], Scene]]:
+        """Numbers of the readings, at such times (s), that a scene held for, and this scene, one
+        after the other.
 
-        A step to the very time of a change belongs to the scene before.
+        Of two readings at the very time of a change the last one belongs to the scene behind it.
         """
-        times = self.angles.times
-        ends = [int(np.searchsorted(times, time * _SAME, side="right")) for time, _ in self.before]
+        ends = [
+            int(np.searchsorted(times, time * _SAME, side="right")) - 1 for time, _ in self.before
+        ]
         bounds = pairwise([0, *ends, len(times)])
         scenes = [*(scene for _, scene in self.before), self.scene]
         return [

@@ -360,9 +360,10 @@ class LockImpulse(Output):
 def _impulses(run: Run, series: Series) -> Array:
     """Shape (planes, sections), N m s; NaN where a joint did not lock."""
     found = np.full(run.locks.shape, np.nan)
+    steps = np.searchsorted(run.rates.times, series.times)
     for place in np.argwhere(np.isfinite(run.locks)):
         where = tuple(place)
-        torques, rates = (each.values[:, *where] for each in (series, run.rates))
+        torques, rates = series.values[:, *where], run.rates.values[steps, *where]
         found[where] = first_impulse(series.times, torques, rates, run.locks[where])
     return found
 

@@ -31,6 +31,8 @@ from ringsim.variables import AT_REST, Fate
 
 _CONSTANTS = ("torque_constant",)
 SEVERAL = ("second winch",)
+_COMMAND = 3
+"""Place of the command in what is read of a winch."""
 _LAGS = 0.01
 """Share of its command by which a motor is slower before it counts: the passage to a limit of
 torque begins with parts in a thousand, which nobody commands."""
@@ -117,7 +119,7 @@ class Motors(Output):
 
     def read(self, now: Reading) -> Array | None:
         """Tension (N), speed (m/s), rope wound (m) and command (m/s) of every winch, shape
-        (planes, 2, 4).
+        (planes, 2, 4); see ``_COMMAND``.
         """
         if now.chain is None or now.commands is None:
             return None
@@ -129,31 +131,32 @@ class Motors(Output):
         """Of the tensions and speeds at the steps; energies are sums of mean torque times turn."""
         held = run.held
         times, winches = series.times, len(run.coordinates["winch"])
+        spans = np.diff(times, prepend=-1.0)
+        # The first of two readings of one time is before what happens then.
+        seen = times + np.where(np.append(spans[1:], 1.0) > 0.0, AT_ONCE, -AT_ONCE)
         found = np.full((4, len(times), len(run.locks), winches), np.nan)
         torque, shaft, power, energy = found
         current, supplied, lost, lagged, climbed, begun = np.full((6, *torque.shape), np.nan)
         # A run that went on may have had another motor before, or none: each for its own steps.
-        for steps, (plane, end), winch, motor, controlled in _motors(run, times):
+        for steps, (plane, end), winch, motor, controlled in _motors(run, series):
             tension, speed, wound, told = series.values[:, plane, end].T
-            ending = motor
-            if controlled and np.any(told[steps] != motor.commanded_speed()):
-                # A step ends with the command with which it began.
-                ending, motor = (
-                    motor.model_copy(update={"speed": each / motor.travel, "ramp": None})
-                    for each in (np.append(told[:1], told[:-1]), told)
-                )
-            runs = np.array([winch.turns(time + AT_ONCE) for time in times], dtype=bool)
-            if winch.after_lock == "stop":
-                runs &= times <= np.nan_to_num(held[plane].max(), nan=math.inf)
+            if controlled:
+                motor = motor.model_copy(update={"speed": told / motor.travel, "ramp": None})
+            runs = np.array([winch.turns(time) for time in seen], dtype=bool)
+            locked = np.nan_to_num(held[plane].max(), nan=math.inf)
+            if winch.after_lock == "stop" or (
+                winch.after_lock == "hold" and locked < winch.start_time
+            ):
+                runs &= times <= locked
             on, since_start = runs[steps], times - winch.start_time
-            # What is told to go slower, or is switched off, has been braked where its step ends:
-            # before that it turned as fast as its rope tells.
-            braked = np.append(False, (np.diff(told) < 0.0) | (runs[:-1] & ~runs[1:]))
-            rate = np.diff(wound, prepend=0.0) / np.diff(times, prepend=-1.0)
-            last, most = np.append(0.0, speed[:-1]), motor.travel * ending.fastest
-            ended = np.where(braked, np.clip(2.0 * rate - last, rate, np.fmax(rate, most)), speed)
+            # What stops at a lock has stopped where its step ends: before that it turned as fast
+            # as its rope tells.
+            stopped = np.append(False, runs[:-1] & ~runs[1:]) & (spans > 0.0)
+            rate = np.diff(wound, prepend=0.0) / np.where(spans > 0.0, spans, math.inf)
+            last, most = np.append(0.0, speed[:-1]), motor.travel * motor.fastest
+            ended = np.where(stopped, np.clip(2.0 * rate - last, rate, np.fmax(rate, most)), speed)
             given = motor.torque(tension, speed, since_start)
-            reached = ending.torque(tension, ended, since_start)
+            reached = motor.torque(tension, ended, since_start)
             # A rotor that is switched on stands, and has its largest torque: no step ends there.
             low, high = (np.maximum(each, 0.0) / motor.travel for each in (speed[:-1], ended[1:]))
             up = runs[:-1] & motor.runs_up(speed, since_start)[:-1] & (high > low)
@@ -178,8 +181,8 @@ class Motors(Output):
             during = times[steps] - times[before]
             if motor.speed is not None:
                 late, slow = (
-                    runs & (has / motor.travel < (1.0 - _LAGS) * one.commanded(since_start)[0])
-                    for one, has in ((motor, speed), (ending, ended))
+                    runs & (has / motor.travel < (1.0 - _LAGS) * motor.commanded(since_start)[0])
+                    for has in (speed, ended)
                 )
                 # Up to the end of a step at which it is switched off it is as at its beginning; a
                 # shaft without inertia that starts is in its first step as at the step's end.
@@ -209,7 +212,7 @@ class Motors(Output):
         if "torque_constant" in holds(run.scene):
             taken = energy + np.cumsum(lost, axis=0)
             values |= _electrical(series, current, supplied, supplied - power, taken)
-        each = [motor for *_, motor, _ in _motors(run, times)]
+        each = [motor for *_, motor, _ in _motors(run, series)]
         # Between readings nothing is above the line of the motor, as a parabola may be.
         bounds = (
             max((one.available(0.0) for one in each), default=math.inf),
@@ -267,23 +270,30 @@ def _electrical(series: Series, *courses: Array) -> Values:
 
 
 def _motors(
-    run: Run, times: Array
+    run: Run, series: Series
 ) -> Iterator[tuple[NDArray[np.intp], tuple[int, int], Winch, MotorWinding, bool]]:
     """Steps, plane and end of every motor, with its winch and itself as they were then, and whether
-    a controller commands it.  One that holds its tension after the lock follows no command then,
-    and takes no torque for its rotor.
+    a controller has commanded it.  One that holds its tension after the lock follows no command
+    then, and takes no torque for its rotor.
     """
-    for steps, scene in run.stretches():
+    times = series.times
+    for steps, scene in run.stretches(times):
         for plane, cable in [] if scene.cables is None else scene.cables.present():
             for end, winch in enumerate(cable.winches):
                 if (motor := winch.winding.motor) is None:
                     continue
-                place, known = (plane, end), scene.controller is not None
-                held = math.inf
+                place, held = (plane, end), math.inf
                 if winch.after_lock == "hold":
                     held = float(np.nan_to_num(run.held[plane].max(), nan=math.inf))
                 later = times[steps] > held + AT_ONCE
-                yield steps[~later], place, winch, motor, known
+                early = steps[~later]
+                # Until its first command a motor follows its own law.
+                told = series.values[early, plane, end, _COMMAND]
+                own = np.flatnonzero(told != motor.commanded_speed())
+                first = int(own[0]) if scene.controller is not None and own.size else len(early)
+                for part, commanded in ((early[:first], False), (early[first:], True)):
+                    if part.size:
+                        yield part, place, winch, motor, commanded
                 if later.any():
                     still = {"rotor_inertia": None, "speed": None, "ramp": None}
                     yield steps[later], place, winch, motor.model_copy(update=still), False

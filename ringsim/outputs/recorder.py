@@ -115,14 +115,6 @@ class Recorder(Remembering):
                     readings += [None] * len(steps) if values is None else list(np.asarray(values))
         self._late.clear()
 
-    def forget_last(self) -> None:
-        """Take the last step out, to note it anew."""
-        last = self.energies[-1]
-        self._lost -= last.lost
-        self._driven -= last.driven
-        for steps in (*self._lists().values(), self.energies, *self.readings.values()):
-            steps.pop()
-
     def memory(self) -> Memory:
         """See ``Remembering``; of the steps their number, see ``history``."""
         return super().memory() | {"steps": len(self.times)}
@@ -177,8 +169,14 @@ class Recorder(Remembering):
 
     def outcome(self) -> Outcome:
         """Put the run on the output grid; what lies after its end is NaN."""
-        times, grid = np.array(self.times), output_times(self._scene)
-        angles, rates = np.array(self.angles), np.array(self.rates)
+        every, grid = np.array(self.times), output_times(self._scene)
+        # Where forces jump there are two readings of one time, between which nothing moves.
+        steps = np.flatnonzero(np.diff(every, append=math.inf) > 0.0)
+        times, angles, rates = (
+            every[steps],
+            np.array(self.angles)[steps],
+            np.array(self.rates)[steps],
+        )
         counts = {
             "steps": len(times) - 1,
             "repeated_steps": self.repeats,
@@ -196,7 +194,7 @@ class Recorder(Remembering):
         def series_of(output: Output) -> Series | None:
             readings = self.readings[output]
             unknown = any(reading is None for reading in readings)
-            return None if unknown else Series(times, np.array(readings, dtype=float), grid)
+            return None if unknown else Series(every, np.array(readings, dtype=float), grid)
 
         values = reduced(run, self.readings, series_of)
         coordinates = spanned(values, known)
@@ -296,7 +294,7 @@ def spanned(values: Iterable[str], known: Mapping[str, NDArray[Any]]) -> dict[st
 # States stored on the way of a run, and going on from one.
 
 
-FORMAT = 7
+FORMAT = 8
 """Of what is stored; a state of another format is refused."""
 
 

@@ -202,7 +202,7 @@ class RunControl(Remembering):
             self._locks.latch(before, found)
             self._note_stop(self._locks, before)
             self._note_overrun(self._locks)
-            self._note_strain(self._locks)
+            self._note_strain(self._locks, max(found.stretch, self.now.stretch))
         if self.goes_on:
             self._note_end(before.time)
         if self.goes_on:
@@ -342,9 +342,9 @@ class RunControl(Remembering):
                 f"with {locks.missing()}",
             )
 
-    def _note_strain(self, locks: Locks) -> None:
+    def _note_strain(self, locks: Locks, strain: float) -> None:
         """End the run where a rope is so long that none would hold."""
-        strain, time = self.now.stretch, self.now.time
+        time = self.now.time
         if strain > self._limits.rope_strain and self.goes_on:
             words = overstrained(strain, time, self._limits, locks.missing())
             self._end(Fate.OVERLOADED, words)

@@ -1,6 +1,5 @@
 """What happens between the steps of a run, whichever engine takes them."""
 
-import itertools
 import math
 from bisect import bisect_right
 from dataclasses import replace
@@ -39,16 +38,21 @@ if TYPE_CHECKING:
 
 
 class Events:
-    """The events of a scene; ``times`` are increasing, s."""
+    """The events of a scene; ``times`` are increasing, s, and at ``switches`` winches start or
+    stop.
+    """
 
     def __init__(self, scene: "Scene") -> None:
         """Faults strike, loads turn round, winches start and stop, and their laws bend, see
         ``Winch.breaks``.
         """
         cables = () if scene.cables is None else (cable for _, cable in scene.cables.present())
-        winches = itertools.chain.from_iterable(cable.winches for cable in cables)
+        winches = [winch for cable in cables for winch in cable.winches]
+        self.switches = {one.start_time for one in winches} | {
+            one.stop_time for one in winches if one.stop_time is not None
+        }
         found = {fault.time for fault in scene.faults} | {scene.loads_turn_at} - {math.inf}
-        found.update(itertools.chain.from_iterable(winch.breaks() for winch in winches))
+        found.update(time for winch in winches for time in winch.breaks())
         self.times = sorted(time for time in found if time > AT_ONCE)
 
     def after(self, time: float) -> float:
@@ -154,7 +158,7 @@ class Run(Remembering):
         self._control = RunControl(
             scene.solver,
             scales,
-            self._read(first),
+            self._read(first, arrived=False),
             self._locks,
             limits=scene.limits,
             follow_deviations=scene.record.stress,
@@ -229,20 +233,38 @@ class Run(Remembering):
             driven = driven or self._cables.winches.driving(time, chain)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)
 
-    def _read(self, now: Instant) -> Instant:
-        """Note a state that the run goes on from; returns it as events leave it."""
+    def _read(self, now: Instant, *, arrived: bool = True) -> Instant:
+        """Note a state that the run goes on from; returns it as events leave it.
+
+        One that a step has ``arrived`` at is noted before events that may jump, and after those
+        that have: two readings of one time.
+        """
+        noted = arrived and self._may_jump(now.time)
+        if noted:
+            self.history.note(self._reading(now))
         changed = self._strike(now) | self._turn_loads(now.time) | self._command(now)
         if changed or self._events.at(now.time):
             self._energy.go_on_from(now.energies.work, self.state)
             self._begin(now)
-            after = self._measured(now.time)
+            after, before = self._measured(now.time), now.energies
             # What a fault lets go is lost; nothing moves while it strikes.
-            lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
-            energies = after.energies._replace(lost=lost, driven=now.energies.driven)
+            gone = before.elastic - after.energies.elastic
+            energies = after.energies._replace(lost=before.lost + gone, driven=before.driven)
             now = replace(after, energies=energies)
+            if noted:
+                own = replace(now, energies=energies._replace(lost=gone, driven=0.0))
+                self.history.note(self._reading(own))
         self._energy.keep()
-        self.history.note(self._reading(now))
+        if not noted:
+            self.history.note(self._reading(now))
         return now
+
+    def _may_jump(self, time: float) -> bool:
+        """Whether forces, or what winches do, may jump at a time (s)."""
+        due = [self._faults.next_time, self._turn]
+        due += [] if self._sampler is None else [self._sampler.next_time]
+        switched = any(abs(time - each) <= AT_ONCE for each in self._events.switches)
+        return switched or min(due) <= time + AT_ONCE
 
     def _strike(self, now: Instant) -> bool:
         """Strike all faults that are due; returns whether there was one."""
@@ -262,10 +284,12 @@ class Run(Remembering):
 
     def _command(self, now: Instant) -> bool:
         """Let the controller sample; returns whether a winch has another law since."""
-        if self._sampler is None or self._cables is None:
+        if self._sampler is None:
             return False
         speeds = self._sampler.due(now.time, now.angles, self._at)
-        return bool(speeds) and self._cables.winches.command(now.time, speeds)
+        if self._cables is None or not speeds:  # who looks on has no winches
+            return False
+        return self._cables.winches.command(now.time, speeds)
 
     def _turn_loads(self, time: float) -> bool:
         """Turn the loads round if it is time (s); returns whether it was."""
