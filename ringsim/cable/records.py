@@ -171,10 +171,10 @@ class Winch(Model):
         # "pull": this law is what it does after the lock, and stays as it is.
         return self.model_copy(update={"winding": hold, "after_lock": "pull"})
 
-    def drives(self, time: float, rate: float) -> bool:
-        """Whether the drum turns at a time (s), at a rate (m/s), or will turn."""
+    def drives(self, time: float, rate: float, end: float) -> bool:
+        """Whether the drum turns at a time (s), at a rate (m/s), or will turn before an end (s)."""
         if not self.turns(time):
-            return time < self.start_time and self.start_time != self.stop_time
+            return time < self.start_time < end and self.start_time != self.stop_time
         if isinstance(self.winding, PrescribedWinding):
             return time - self.start_time < self.winding.rests_from()
         if time - self.start_time < max(self.winding.breaks(), default=0.0):

@@ -122,11 +122,15 @@ class Answering(NamedTuple):
         return cls(np.zeros(ends, dtype=np.int64), moves, *numbers)
 
 
-def driving(winches: Mapping[tuple[int, int], Winch], time: float, state: ChainState) -> bool:
-    """Whether any winch, by cable and end, turns or will turn on a rope that is whole."""
+def driving(
+    winches: Mapping[tuple[int, int], Winch], time: float, state: ChainState, end: float
+) -> bool:
+    """Whether any winch, by cable and end, turns or will turn before an end (s) on a rope that is
+    whole.
+    """
     ropes, rate = state.ropes, state.wound_rate
     return any(
-        winch.drives(time, float(rate[place])) and bool(ropes.alive[ropes.of_end[place]])
+        winch.drives(time, float(rate[place]), end) and bool(ropes.alive[ropes.of_end[place]])
         for place, winch in winches.items()
     )
 
@@ -330,9 +334,9 @@ class Winches:
                     self._ahead.pop(place, None)
         self._tell()
 
-    def driving(self, time: float, state: ChainState) -> bool:
-        """Whether any winch turns or will turn on a rope that is whole."""
-        return driving(self._winches, time + AT_ONCE, state)
+    def driving(self, time: float, state: ChainState, end: float) -> bool:
+        """See the function of this name; from a time (s) on."""
+        return driving(self._winches, time + AT_ONCE, state, end)
 
     def advance(
         self, time: float, state: ChainState, slopes: Array, ropes: Ropes | None = None,

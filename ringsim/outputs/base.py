@@ -3,6 +3,8 @@
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +21,9 @@ from ringsim.outputs.family import (
     Values,
     Variable,
 )
+from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.solver import LEAST_TOLERANCE, NO_DEVIATIONS
+from ringsim.scene import Scene
 from ringsim.stepping.locks import SURE, UNKNOWN, History, may_decide
 from ringsim.tables import number_text
 
@@ -66,12 +70,24 @@ class BaseReaction(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """On the output grid; the peaks are those of all steps."""
+        # At the start it is that of rods that are rigid, without faults and ropes: where these
+        # pull or strike, the first step tells what holds the base.
+        if _jolted_at_start(run.scene) and len(series.times) > 1:
+            told = series.values.copy()
+            told[0] = told[1]
+            series = replace(series, values=told)
         force, torque = series.on_grid()
         values: Values = {"base_force": force, "base_torque": torque}
         for peak, sizes in zip(self.peaks, np.linalg.norm(series.values, axis=2).T, strict=True):
             most, found = peak.of(run, series.times, sizes)
             values |= found | {peak.name: np.asarray(most)}
         return values
+
+
+def _jolted_at_start(scene: Scene) -> bool:
+    cables = [] if scene.cables is None else scene.cables.present()
+    taut = any(cable.initial_slack < 0.0 for _, cable in cables)
+    return taut or any(fault.time <= AT_ONCE for fault in scene.faults)
 
 
 class BaseRotation(Output):
@@ -101,8 +117,29 @@ class BaseRotation(Output):
         return None if turn is None else np.asarray(Rotation.from_matrix(turn).as_rotvec())
 
     def reduce(self, run: Run, series: Series) -> Values:
-        """In degrees."""
-        return _in_degrees("base_rotation", self.peak, run, series)
+        """In degrees; whole turns count."""
+        turned = replace(series, values=unwound(series.values))
+        return _in_degrees("base_rotation", self.peak, run, turned)
+
+
+def unwound(vectors: Array) -> Array:
+    """Rotation vectors of steps, shape (n, 3), rad, each as near to the one before as whole turns
+    about its own axis bring it: as they are, none is longer than pi.
+    """
+    found = np.array(vectors)
+    for before, now in pairwise(found):
+        size = float(np.linalg.norm(now))
+        # What is nearly a whole turn from the start has no axis of its own.
+        axis = (
+            now / size if size > _NO_TURN else before / max(float(np.linalg.norm(before)), 1e-300)
+        )
+        turns = round((float(before @ axis) - float(now @ axis)) / math.tau)
+        now += math.tau * turns * axis
+    return found
+
+
+_NO_TURN = 1e-9
+"""Rotation whose axis is round-off, rad."""
 
 
 class BaseRate(Output):

@@ -82,7 +82,7 @@ class RunControl(Remembering):
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
         self._rest = Rest(start, solver.end_time, scales.energy)
         self._farthest = Overrun()
-        self._scales, self._turn = scales, turn
+        self._scales, self._turn = scales, turn if turn < solver.end_time else math.inf
         self._sampled, self._cut = sampled, False
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []

@@ -226,11 +226,13 @@ class Run(Remembering):
         chain: "ChainState | None",
     ) -> Instant:
         """A state with its ropes, and whether anything still drives it."""
-        tensions, stretch, driven = None, 0.0, math.isfinite(self._faults.next_time)
+        # What comes behind the end drives nothing.
+        end = self._scene.solver.end_time
+        tensions, stretch, driven = None, 0.0, self._faults.next_time < end
         if self._cables is not None and chain is not None:
             tensions = chain.tensions
             stretch = max([0.0, *chain.strains[chain.ropes.alive].tolist()])
-            driven = driven or self._cables.winches.driving(time, chain)
+            driven = driven or self._cables.winches.driving(time, chain, end)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)
 
     def _read(self, now: Instant, *, arrived: bool = True) -> Instant:

@@ -217,7 +217,7 @@ class PlanarTruss(Structure):
 
     def check(self, scene: "Scene") -> None:
         """See ``Structure``: parts of rings are refused, the cable is needed."""
-        for name in ("stop", "boom", "spacecraft", "offload", "net", "loads"):
+        for name in ("hinge_spring", "stop", "boom", "spacecraft", "offload", "net", "loads"):
             if getattr(scene, name) is not None:
                 raise ValueError(f'{name} is for rings only: leave it out ({name} = "none")')
         if scene.joints.model_dump():
@@ -231,6 +231,15 @@ class PlanarTruss(Structure):
                 f'cables.upper.end = "{scene.cables.upper.end}" must be "first": the winch '
                 "stands on the fixed axis"
             )
+        # Its cable runs over no pulley, and nothing locks.
+        cable = scene.cables.upper
+        for record, path, names in (
+            (cable, "cables.upper", ("block_offset", "bracket", "friction", "pulley_radius")),
+            (cable.winch, "cables.upper.winch", ("after_lock",)),
+        ):
+            for name in names:
+                if getattr(record, name) != type(record).model_fields[name].default:
+                    raise ValueError(f"{path}.{name} is for rings only: leave it out")
         if not scene.rods.oriented:
             raise ValueError(
                 f'rods.kind = "{kind_of(scene.rods)}" must be "geometrically-exact": the cable '

@@ -109,8 +109,8 @@ def test_a_command_rises_as_a_quintic_step(inertia: float | None) -> None:
 
 def test_a_rising_command_still_drives_a_drum_that_has_hardly_begun() -> None:
     winch = Winch(winding=motor(speed=300.0, ramp=RAMP), start_time=1.0)
-    assert winch.drives(1.0 + 0.1 * RAMP, 0.0)
-    assert not winch.drives(1.0 + 1.1 * RAMP, 0.0)
+    assert winch.drives(1.0 + 0.1 * RAMP, 0.0, 9.0)
+    assert not winch.drives(1.0 + 1.1 * RAMP, 0.0, 9.0)
 
 
 def test_torque_is_load_and_what_the_rotor_takes() -> None:
