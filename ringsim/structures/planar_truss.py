@@ -231,10 +231,10 @@ class PlanarTruss(Structure):
                 f'cables.upper.end = "{scene.cables.upper.end}" must be "first": the winch '
                 "stands on the fixed axis"
             )
-        # Its cable runs over no pulley, and nothing locks.
+        # Its cable runs over no block at a V-joint, and nothing locks.
         cable = scene.cables.upper
         for record, path, names in (
-            (cable, "cables.upper", ("block_offset", "bracket", "friction", "pulley_radius")),
+            (cable, "cables.upper", ("block_offset", "bracket")),
             (cable.winch, "cables.upper.winch", ("after_lock",)),
         ):
             for name in names:

@@ -13,6 +13,7 @@ from ringsim.choice import kinds_of
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Correlation
 from ringsim.sampling.designs import Design
+from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import load_scene
 
@@ -50,8 +51,9 @@ def values(table, path):
 
 
 def test_every_kind_is_tested():
-    own = {"grid", "list", "one-at-a-time", "saltelli", "morris", "subset-simulation"}
-    assert set(kinds_of(Design)) == {*PROBABILISTIC, *own}
+    own = {"grid", "list", "one-at-a-time", "saltelli", "morris"}
+    levels = str(SubsetSimulation.model_fields["kind"].default)
+    assert set(kinds_of(Design)) == {*PROBABILISTIC, *own, levels}
 
 
 @pytest.mark.parametrize("kind", PROBABILISTIC)
