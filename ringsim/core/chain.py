@@ -179,12 +179,13 @@ class Chain:
             state.shares, state.exponents, state.speeds,
         )  # fmt: skip
         drums = Drums(state.natural, state.wound_rates, np.zeros(len(ropes.starts)))
+        tight = 0.5 + 0.5 * np.tanh(0.5 * state.forces / table.material[:, 2])
         count, n = call("factors_needed", table, _whole(slopes)), ropes.spans
         pulls, found = np.zeros((count, n)), np.zeros((count, n, 3))
         call(
             "tension_changes", table, drums, state.log_decays,
             _whole(friction.by_angle(state.pulleys)), _whole(slopes), spans, _whole(velocities),
-            _whole(left), by_place, by_rate, pulls, found,
+            _whole(tight), _whole(left), by_place, by_rate, pulls, found,
         )  # fmt: skip
         told, row = [], 0
         for rope in np.flatnonzero(ropes.alive).tolist():

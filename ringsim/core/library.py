@@ -64,7 +64,7 @@ _FUNCTIONS: dict[str, tuple[str, Any]] = {
     "work_of_ropes": ("taaa", _NONE),
     "pull_tight": ("tttaat", _REAL),
     "factors_needed": ("ta", _WHOLE),
-    "tension_changes": ("ttaaataarraa", _NONE),
+    "tension_changes": ("ttaaataaarraa", _NONE),
     "spread_changes": ("ttaaa", _NONE),
     "find_slopes": ("tt", _WHOLE),
     "limit_of_ropes": ("w", _REAL),

@@ -126,8 +126,9 @@ _DECAY = 3
 
 
 class Roped(NamedTuple):
-    """Ropes as faults leave them, with what their winches do and how they run: slopes of the
-    pulleys' friction (s/m), the share of a change of path that stretches each rope, room for
+    """Ropes as faults leave them, with what their winches do and how they run: what
+    Newton has seen of speeds over pulleys and of forces of ropes, slopes of the pulleys' friction
+    (s/m) and of tensions after forces, the share of a change of path that stretches each rope, room for
     changes of tension in factors, and the border of the fronts that they make.
     """
 
@@ -136,7 +137,9 @@ class Roped(NamedTuple):
     drums: Drums
     spans: Spans
     seen: Seen
+    drawn: Seen
     slopes: Array
+    tight: Array
     left: Array
     pulls: Array
     changes: Array
@@ -159,7 +162,8 @@ class Roped(NamedTuple):
         most = call("factors_needed", table, np.ones(pulleys))
         return cls(
             table, winches, Drums.still(count), Spans.empty(ropes),
-            Seen.empty(pulleys), np.zeros(pulleys), np.ones(count), np.zeros((most, spans)),
+            Seen.empty(pulleys), Seen.empty(count), np.zeros(pulleys), np.ones(count),
+            np.ones(count), np.zeros((most, spans)),
             np.zeros((most, spans, 3)), np.zeros((2, most, points, 3)),
             Border.empty(unknowns, most, points, hub),
         )  # fmt: skip
@@ -277,6 +281,7 @@ class FrameCables:
         cables' ideal paths after the opening angle, m/rad.
         """
         self.roped.seen.forget()
+        self.roped.drawn.forget()
         self._turned_at = math.nan
         self.winches.advance(time, state, slopes, self.ropes, self.roped.ropes)
 

@@ -214,6 +214,8 @@ class Standing:
     def unbalance(self) -> Array:
         """Forces out of balance, N and N m."""
         given = self._still.table, self.state.table
+        if self.model.cables is not None:
+            self._roped.drawn.forget()  # the tangent is that of this very state
         # A step so long that what has moved has no acceleration.
         self.model.core("unbalance", 0.0, _STILL, self.state, *given)
         return self.model.system.g

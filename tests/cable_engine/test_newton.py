@@ -11,6 +11,9 @@ import pytest
 from driven import truss, write_all
 from ringsim.exudyn.build import build
 from ringsim.exudyn.integrate import solver_settings
+from ringsim.frame.integrate import solve as run_frame
+from ringsim.scene import load_scene
+from ringsim.variables import Status
 
 pytestmark = pytest.mark.quick
 
@@ -73,3 +76,29 @@ def test_the_reduced_tangent_converges_as_well() -> None:
     assert reduced[2] == pytest.approx(exact[2], rel=0.1)
     # Linear at the end: each iteration at least thirds the residual.
     assert max(b / a for a, b in pairwise(reduced[1:])) < 0.34
+
+
+def test_a_damped_rope_whose_winch_stops_goes_slack_within_a_step() -> None:
+    """Its tension falls by what the winch's speed has damped; V-joints that hold it have no inertia
+    about their bars, so that tangents of the taut rope and of the slack one lead to each other.
+    """
+    arc = {"sections": 3, "closed": False, "polygon_sections": 4, "opening_angle": 26.0}
+    scene = load_scene("ring18-cable").with_values(
+        {f"structure.{name}": value for name, value in arc.items()}
+        | {
+            "boom.base": "fixed", "net": "none", "rods.damping": 0.0, "stop.latch": False,
+            "cables.upper": "none",
+            "cables.lower": {
+                "winch": {
+                    "winding": {"kind": "ramp", "speed": 0.36, "duration": 0.55}, "stop_time": 1.69,
+                },
+                "bracket": {"kind": "bar-half", "angle": 92.0}, "axial_stiffness": 6e4,
+                "friction": {"kind": "bearing", "coefficient": 1e-4}, "damping_time": 4e-3,
+                "initial_slack": 0.007,
+            },
+            "solver.end_time": 1.75, "solver.restarts": 0,
+        }
+    )  # fmt: skip
+    found = run_frame(scene)
+    assert found.status is Status.OK, found.reason
+    assert found.values["energy_error"] < 1e-3

@@ -107,9 +107,10 @@ def test_the_border_is_the_tangent_of_the_chain(
     count, points = call("factors_needed", case.table, slopes), sum(POINTS)
     pulls, changes = np.zeros((count, ropes.spans)), np.zeros((count, ropes.spans, 3))
     log_slopes = truth.friction.by_angle(truth.pulleys)
+    tight = 0.5 + 0.5 * np.tanh(0.5 * truth.forces / case.table.material[:, 2])
     call(
         "tension_changes", case.table, case.drums, case.log_decays, log_slopes, slopes, case.spans,
-        case.rates, left, 1.0, by_rate, pulls, changes,
+        case.rates, tight, left, 1.0, by_rate, pulls, changes,
     )  # fmt: skip
     out = np.zeros((2, count, points, 3))
     call("spread_changes", case.table, case.spans, pulls, changes, out)

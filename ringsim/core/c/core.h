@@ -235,8 +235,8 @@ typedef struct {
     Answering winches;
     Drums drums;
     Spans spans;
-    Seen seen;
-    Reals slopes, left, pulls, changes, factors;
+    Seen seen, drawn;
+    Reals slopes, tight, left, pulls, changes, factors;
     Border border;
 } Roped;
 
@@ -332,6 +332,7 @@ void find_paths(const RopeTable *ropes, const Spans *spans, D *paths);
 I turn_winches(const Answering *own, const RopeTable *ropes, Ask ask);
 I find_left(const Answering *own, const RopeTable *ropes, Ask ask, D *left, I n);
 D pull_cables(const System *system, const Roped *roped, const D *places, const D *rates, D *g);
+void note_forces(const Roped *roped);
 I find_slopes(const Roped *roped, const PulleyLaws *laws);
 void move_paths(const PathPoints *paths, const Mesh *mesh, const Arms *arms, const D *x, I n, D *out);
 void add_cables(const System *system, const Roped *roped, const D *rates, D rate_by_place, I count,

@@ -69,6 +69,7 @@ I unbalance(const System *system, const Roped *roped, I asks, Ask ask, D step, c
             if (!(roped->drums.natural.at[r] > 0.0)) return ROPES;
         if (!(least > SHORTEST)) return ROPES; /* none without an answer */
         note_rates(&roped->seen, roped->spans.speed.at, roped->spans.speed.n);
+        note_forces(roped);
     }
     for (I k = 0; k < mesh->fixed.n; k++) {
         system->reaction.at[k] = g[mesh->fixed.at[k]];

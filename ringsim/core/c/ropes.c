@@ -283,13 +283,41 @@ static const D PASSING = 2e-4;
 /* What ringsim.cable.ropes and ringsim.core.tension count with, too. */
 D limit_of_ropes(I number) { return number == 0 ? SHORTEST : PASSING; }
 
+static D drawing(const Roped *roped, I rope) {
+    const D *material = roped->ropes.material.at + 3 * rope;
+    return force_of(material, roped->drums.natural.at[rope], roped->drums.winding.at[rope],
+                    path_of(&roped->ropes, &roped->spans, rope));
+}
+
+/* Remember an iterate's forces of the ropes, before slack. */
+void note_forces(const Roped *roped) {
+    I count = roped->ropes.starts.n;
+    D forces[count + 1];
+    for (I rope = 0; rope < count; rope++) forces[rope] = drawing(roped, rope);
+    note_rates(&roped->drawn, forces, count);
+}
+
+/* Slopes of the ropes' tensions after these forces.  A slack rope that Newton has seen taut within
+   the step has that of the secant: tangents of either side would lead to the other one for ever,
+   where a damped rope holds what has no inertia. */
+static void find_tight(const Roped *roped) {
+    for (I rope = 0; rope < roped->ropes.starts.n; rope++) {
+        D width = roped->ropes.material.at[3 * rope + 2], force = drawing(roped, rope);
+        D own = 0.5 + 0.5 * tanh(0.5 * force / width), there = rate_across(&roped->drawn, rope);
+        roped->tight.at[rope] = slope_between(&roped->drawn, rope, force, own, smooth(force, width),
+                                              smooth(there, width));
+    }
+}
+
 /* Slopes (s/m) of the pulleys' exponents after the ropes' speeds, with those of laws of speed, as far
-   as tangents need them; plays the laws' derivatives.  Returns the number of factors. */
+   as tangents need them, and of tensions after forces; plays the laws' derivatives.  Returns the
+   number of factors. */
 I find_slopes(const Roped *roped, const PulleyLaws *laws) {
     const RopeTable *ropes = &roped->ropes;
     const Spans *spans = &roped->spans;
     I pulleys = ropes->behind.n;
     D *slopes = roped->slopes.at;
+    find_tight(roped);
     show(ropes, spans, laws, &laws->slopes);
     play(&laws->slopes);
     const D *decays = row_of(&laws->decays, DECAY), *by_speed = row_of(&laws->slopes, BY_SPEED);
@@ -347,8 +375,8 @@ static void by_angle(const Rope *rope, D slope, D tail, I first, I b, const Span
    with, after the differences of the points, (k, spans, 3); both zeros before.
 
    Derivatives after places are taken by_place times, those after rates by_rate times.  The first
-   factor of a rope is that of its mean tension, with the share left of its stiffness that its winches
-   do not answer.  log_slopes are the derivatives of log_decays after the angles, 1/rad, slopes those
+   factor of a rope is that of its mean tension, whose slope after its force is tight, with the share
+   left of its stiffness that its winches do not answer.  log_slopes are the derivatives of log_decays after the angles, 1/rad, slopes those
    of the exponents after the rope's speed, s/m.
 
    A pulley's friction changes all spans behind it, less their share of the path.  Pulleys between
@@ -356,9 +384,9 @@ static void by_angle(const Rope *rope, D slope, D tail, I first, I b, const Span
    last factor of the rope. */
 void tension_changes(const RopeTable *ropes, const Drums *drums, const D *log_decays, I n_decays,
                      const D *log_slopes, I n_log_slopes, const D *slopes, I n_slopes,
-                     const Spans *spans, const D *velocities, I n_velocities, const D *left, I n_left,
-                     D by_place, D by_rate, D *pulls, I n_pulls, D *changes, I n_changes) {
-    (void)n_decays, (void)n_log_slopes, (void)n_slopes, (void)n_velocities, (void)n_left,
+                     const Spans *spans, const D *velocities, I n_velocities, const D *tight,
+                     I n_tight, const D *left, I n_left, D by_place, D by_rate, D *pulls, I n_pulls, D *changes, I n_changes) {
+    (void)n_decays, (void)n_log_slopes, (void)n_slopes, (void)n_velocities, (void)n_tight, (void)n_left,
         (void)n_pulls, (void)n_changes;
     I n = spans->length.n;
     D swing[3 * n + 1], longer[3 * n + 1];
@@ -376,8 +404,7 @@ void tension_changes(const RopeTable *ropes, const Drums *drums, const D *log_de
         Path path = path_of(ropes, spans, r);
         const D *material = ropes->material.at + 3 * r;
         D natural = drums->natural.at[r], winding = drums->winding.at[r];
-        D slack = 0.5 + 0.5 * tanh(0.5 * force_of(material, natural, winding, path) / material[2]);
-        D elastic = material[0] / natural * slack, viscous = elastic * material[1];
+        D elastic = material[0] / natural * tight[r], viscous = elastic * material[1];
         D own = by_place * left[r];
         D stretched = own * (elastic + viscous * winding / natural) + by_rate * viscous;
         for (I i = first; i < last; i++) {
@@ -623,7 +650,7 @@ void add_cables(const System *system, const Roped *roped, const D *rates, D rate
     memset(factors, 0, (size_t)(2 * all_points) * sizeof(D));
     tension_changes(ropes, &roped->drums, row_of(&laws->decays, DECAY), 0,
                     row_of(&laws->slopes, BY_ANGLE), 0, roped->slopes.at, 0, spans, rates, 0,
-                    roped->left.at, 0, 1.0, rate_by_place, pulls, 0, changes, 0);
+                    roped->tight.at, 0, roped->left.at, 0, 1.0, rate_by_place, pulls, 0, changes, 0);
     spread_changes(ropes, spans, pulls, count * n, changes, 0, factors, 2 * all_points);
     add_span_tangent(paths, arms, spans, &system->fronts);
     pull_paths(paths, mesh, arms, factors, count, roped->border.columns.at, wide, first);
