@@ -126,10 +126,10 @@ _DECAY = 3
 
 
 class Roped(NamedTuple):
-    """Ropes as faults leave them, with what their winches do and how they run: what
-    Newton has seen of speeds over pulleys and of forces of ropes, slopes of the pulleys' friction
-    (s/m) and of tensions after forces, the share of a change of path that stretches each rope, room for
-    changes of tension in factors, and the border of the fronts that they make.
+    """Ropes as faults leave them, with what their winches do and how they run: what Newton has
+    seen of speeds over pulleys and of forces of ropes, slopes of the pulleys' friction (s/m) and of
+    tensions after forces, the share of a change of path that stretches each rope, room for changes
+    of tension in factors, and the border of the fronts that they make.
     """
 
     ropes: RopeTable
