@@ -359,7 +359,7 @@ def weights_of(
                     f"--reweight {path}: {key} = {show(mine)}: the samples were drawn {drawn}, and "
                     "a new distribution changes no more than what they are worth: leave it out"
                 )
-        _check_cover(path, old, new, len(values))
+        _check_cover(path, old, new, max(1, int(ran(campaign).sum())))
         logarithm += log_ratio(old, new, values)
         pairs[path] = Pair(old, new, values[:1].size)
     return np.exp(np.minimum(logarithm, 700.0)), pairs

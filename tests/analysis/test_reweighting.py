@@ -328,6 +328,17 @@ def test_what_samples_do_not_cover_is_refused(reweighted, words):
         analyse(made, None, reweighted)
 
 
+def test_samples_that_have_not_run_cover_nothing():
+    """200 samples hardly reach beyond 0.9975, where more than 1 % of the new law lies."""
+    made = drawn_campaign(RandomDesign(samples=4000), linear, 1, 3)
+    beyond = {"x1": {"kind": "uniform", "low": 0.91, "high": 0.9985}}
+    assert int(analyse(made, None, beyond)["reweighted_samples"]) == 4000
+    part = made.assign(status=made["status"].where(made["sample"] < 200, -1))
+    for few in (made.isel(sample=slice(200)), part):
+        with pytest.raises(InputError, match="where hardly any of 200 samples lie"):
+            analyse(few, None, beyond)
+
+
 def test_designs_without_a_population_are_refused():
     with pytest.raises(InputError, match="do not represent a population"):
         analyse(drawn_campaign(Morris(samples=20), linear, 2, 1), None, {"x1": NARROW})
