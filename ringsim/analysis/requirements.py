@@ -233,6 +233,12 @@ def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
         if (many := bool(name in VARIABLES and VARIABLES[name].dims)) or place:
             cure = instead_of(name) if many else f"a sample has one value: leave out {place}"
             raise InputError(f"--require {name}{place or ''}: {cure}")
+        keys = [part[1] for part in parts if part]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise InputError(
+                    f"--require {name}: {key} is given twice: leave out one of the two"
+                )
         table[name] = {part[1]: _told(name, part[1], part[2], part[3]) for part in parts if part}
     return read_requirements(table, "--require")
 

@@ -87,6 +87,10 @@ def test_wrong_requirements_are_told_with_the_cure(table, words):
         (["peak_tension[1]: max 3"], r"peak_tension\[1\]: a sample has one value: leave out \[1\]"),
         (["asynchrony_max: max 10 N, probability 0.9"], "max = 10 N: give it in deg"),
         (["asynchrony_max: max 1, probability 9 %"], "probability = 9 %: give it without"),
+        (
+            ["deployment_time: max 5, max 6, probability 0.5, confidence 0.9"],
+            "--require deployment_time: max is given twice: leave out one of the two",
+        ),
         (["locked_joints: min 3 s, probability 0.9"], "min = 3 s: give it as a number without"),
     ],
 )
