@@ -7,6 +7,7 @@
 import contextlib
 import functools
 import html
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -167,7 +168,10 @@ class Ring:
         same tables, cells as text, by their titles or else the heads of their first columns; what
         stands below them is ``notes`` among their ``attrs``.
 
-        ``full`` has every statistic with its interval, and every measure of what matters.
+        So "output" has a row an output, and where there are such "output, reweighted" those for
+        other distributions.  ``full`` has every statistic with its interval, as "every statistic",
+        and every measure of what matters.  Of tables that are called alike the second one is
+        "NAME (2)".
         InputError if it is no campaign, or its requirements cannot be judged.
         """
         import pandas as pd
@@ -177,13 +181,15 @@ class Ring:
 
         own = self._dataset
         analysis = own if "statistic" in own.dims else analyse(own)
-        found = {}
+        found, times = dict[str, pd.DataFrame](), Counter[str]()
         for each in sections(analysis, self._folder(), full=full).values():
             for table in each.more or each.tables:
                 if table.rows:
                     rows = pd.DataFrame(table.rows, columns=table.head)
                     rows.attrs["notes"] = list(table.notes)
-                    found[table.title or table.head[0]] = rows
+                    name = table.title or table.head[0]
+                    times[name] += 1
+                    found[name if times[name] == 1 else f"{name} ({times[name]})"] = rows
         return found
 
     def dossier(self, test: "Measurement | None" = None) -> "dict[str, pd.DataFrame]":

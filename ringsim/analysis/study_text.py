@@ -151,7 +151,7 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
     of_shares = ("probability of", "reweighted", "95 % interval", "samples that determine it")
     kinds = analysis.get("kind", xr.DataArray([])).values.tolist()  # shares of all that ran
     of_all = marked(Table(of_shares, shares, notes), analysis, safe=kinds)
-    found = [first, marked(Table(head, rows), analysis), of_all]
+    found = [first, marked(Table(head, rows, title="output, reweighted"), analysis), of_all]
     return [*found, _verdicts(analysis)] if "reweighted_verdict" in analysis else found
 
 
@@ -502,7 +502,7 @@ def every_statistic(analysis: xr.Dataset) -> Table:
         "output", "unit", "statistic", "estimate", "95 % interval", "in sample",
         "its error bar", *_parts(), "samples used", "failed runs", "no value",
     )  # fmt: skip
-    return marked(Table(head, rows), analysis)
+    return marked(Table(head, rows, title="every statistic"), analysis)
 
 
 def outputs_in(analysis: xr.Dataset) -> list[str]:

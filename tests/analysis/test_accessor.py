@@ -14,10 +14,14 @@ from made_campaign import SECTIONS, made_campaign
 from scipy.stats import binomtest
 
 import ringsim
+from made import drawn_campaign
+from ringsim.analysis import study_text
 from ringsim.analysis.courses import course, courses
 from ringsim.plots import figures
 from ringsim.plots.figures import names_for
 from ringsim.refusal import InputError
+from ringsim.sampling.designs.independent import RandomDesign
+from ringsim.tables import Table
 
 
 @pytest.fixture(scope="module")
@@ -159,3 +163,29 @@ def test_who_leads_is_refused_of_a_campaign_without_records() -> None:
     made = made_campaign(3).drop_dims("plane")
     with pytest.raises(InputError, match="leader: needs plane"):
         made.ring.leader()
+
+
+def test_no_table_takes_the_place_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With everything that there is to tell: all have a name of their own, and the numbers."""
+    made = drawn_campaign(RandomDesign(samples=200), lambda x: x[:, 0], 1, 5)
+    law = {"kind": "uniform", "low": 0.0, "high": 0.9}
+    analysis = ringsim.analyse(made, reweighted={"x1": law})
+    for full in (False, True):
+        found = analysis.ring.tables(full=full)
+        parts = study_text.sections(analysis, "x", full=full).values()
+        every = [table for each in parts for table in each.more or each.tables if table.rows]
+        assert [rows.to_numpy().tolist() for rows in found.values()] == [
+            [list(row) for row in table.rows] for table in every
+        ]
+        (row,) = found["output"].to_numpy().tolist()
+        assert float(row[list(found["output"]).index("mean")]) == pytest.approx(
+            made["asynchrony_max"].mean().item(), abs=5e-3
+        )
+        kept = made["asynchrony_max"].values[made["x1"].values < 0.9]
+        told = found["output, reweighted"].set_index("statistic").loc["mean", "reweighted"]
+        assert float(told) == pytest.approx(kept.mean(), abs=5e-3)
+    alike = study_text.Section(
+        "a", "A", [Table(("output",), [("x",)]), Table(("output",), [("y",)])]
+    )
+    monkeypatch.setattr(study_text, "sections", lambda *_, **__: {"a": alike})
+    assert list(analysis.ring.tables()) == ["output", "output (2)"]
