@@ -178,8 +178,9 @@ class Ring:
 
         from ringsim.analysis.study import analyse
         from ringsim.analysis.study_text import sections
+        from ringsim.dataset import with_plain_attributes
 
-        own = self._dataset
+        own = with_plain_attributes(self._dataset)
         analysis = own if "statistic" in own.dims else analyse(own)
         found, times = dict[str, pd.DataFrame](), Counter[str]()
         for each in sections(analysis, self._folder(), full=full).values():

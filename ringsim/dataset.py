@@ -105,6 +105,14 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
         )  # fmt: skip
 
 
+def with_plain_attributes(found: xr.Dataset) -> xr.Dataset:
+    """A dataset with the numbers among its attributes as Python's: a file gives them back as
+    numpy's, whose truths are no numbers to multiply a word with.
+    """
+    plain = {n: v.item() if isinstance(v, np.generic) else v for n, v in found.attrs.items()}
+    return found.assign_attrs(plain)
+
+
 _TEXTS = ("scene", "campaign", "title", "reason", "fidelity", "question", "campaign_name")
 _JSON = ("design", "requirements", "max_difference", "stop_when", "suspects", "outputs")
 """Attributes of a run or a campaign that are texts, and those that are JSON."""

@@ -189,3 +189,18 @@ def test_no_table_takes_the_place_of_another(monkeypatch: pytest.MonkeyPatch) ->
     )
     monkeypatch.setattr(study_text, "sections", lambda *_, **__: {"a": alike})
     assert list(analysis.ring.tables()) == ["output", "output (2)"]
+
+
+def test_a_stored_analysis_has_the_tables_of_a_new_one(tmp_path: Path) -> None:
+    """Also where its numbers are 1, of which texts have no plural."""
+    for made in (made_campaign(1), made_campaign(6, failed=(1,), not_run=(5,))):
+        analysis = ringsim.analyse(made)
+        analysis.to_netcdf(tmp_path / "a.nc")
+        with xr.open_dataset(tmp_path / "a.nc") as stored:
+            found = stored.ring.tables(full=True)
+        expected = analysis.ring.tables(full=True)
+        assert list(found) == list(expected)
+        for name, rows in expected.items():
+            again = {"run it again"} & set(rows)  # in the folder of the file
+            assert rows.drop(columns=again).equals(found[name].drop(columns=again))
+            assert rows.attrs == found[name].attrs
