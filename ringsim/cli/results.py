@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.design import called, inputs, median_and_worst, open_stored
 from ringsim.analysis.engines import check_lines
+from ringsim.analysis.intervals import ran
 from ringsim.analysis.requirements import parse_requirements, required_by
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.merging import is_behind, merge
@@ -27,7 +27,7 @@ from ringsim.cli.options import (
     require_with,
     write_animation,
 )
-from ringsim.dataset import open_lazily, save
+from ringsim.dataset import open_lazily, save, with_plain_attributes
 from ringsim.files import MERGED, require_file, require_place, writing
 from ringsim.refusal import EXIT_DONE, EXIT_NOT_MET, InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
@@ -240,18 +240,37 @@ def _write(
             f"--analysis {analysis}: has no analysis: give a file of ringsim analyse --out, or "
             "leave it out"
         )
+    if known is not None:
+        _require_of(known, campaign, analysis, file)
     test = None if measured is None else load_measured(measured)
     return write_report(campaign, out, str(file.parent), known, test)
 
 
+def _require_of(
+    known: xr.Dataset, campaign: xr.Dataset, analysis: Path | None, file: Path
+) -> None:  # fmt: skip
+    """Refuse (InputError) an analysis of another campaign; say where it is of other samples."""
+    again = f"run ringsim analyse {file.parent} --out {analysis} again, or leave it out"
+    if known.attrs.get("campaign_identity", "") != campaign.attrs.get("identity", ""):
+        name = known.attrs.get("campaign_name", "")
+        raise InputError(
+            f"--analysis {analysis}: it is of another campaign{f' ({name})' if name else ''}, or "
+            f"of this one with another scene, engine or inputs, than {file}: {again}"
+        )
+    held = campaign.sizes["sample"], int(ran(campaign).sum())
+    stored = known.attrs.get("samples"), known.attrs.get("samples_run")
+    if stored != held:
+        click.echo(
+            f"--analysis {analysis}: it is of {stored[1]} samples that have run of {stored[0]}, "
+            f"and {file} has {held[1]} of {held[0]}: its numbers are shown as they are; for those "
+            f"of all samples {again}",
+            err=True,
+        )
+
+
 def _load(file: Path) -> xr.Dataset:
     try:
-        found = xr.load_dataset(file, engine="netcdf4")
-        # A file gives numbers back as numpy's, whose truths are no numbers to multiply a word with.
-        found.attrs = {
-            n: v.item() if isinstance(v, np.generic) else v for n, v in found.attrs.items()
-        }
-        return found
+        return with_plain_attributes(xr.load_dataset(file, engine="netcdf4"))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(

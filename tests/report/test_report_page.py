@@ -467,6 +467,32 @@ def test_a_stored_analysis_gives_the_page_of_a_new_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("_undrawn")
+def test_a_stored_analysis_of_another_campaign_is_refused(tmp_path: Path) -> None:
+    """By what identifies a campaign, not by its name; one of fewer samples is told."""
+    other, stored, out = tmp_path / "other.nc", str(tmp_path / "a.nc"), str(tmp_path / "1.html")
+    made = made_campaign(8, not_run=(6, 7))
+    for own, file in (("first", tmp_path / "campaign.nc"), ("second", other)):
+        save(made.assign_attrs(identity=own), file)
+    few = tmp_path / "few.nc"
+    save(made.isel(sample=slice(4)).assign_attrs(identity="first"), few)
+
+    def report_of(analysed: Path) -> tuple[int, str]:
+        assert CliRunner().invoke(cli, ["analyse", str(analysed), "--out", stored]).exit_code == 0
+        return run(str(tmp_path), "--out", out, "--analysis", stored)
+
+    code, told = report_of(other)
+    assert code == EXIT_BAD_INPUT
+    assert told.startswith(f"--analysis {stored}: it is of another campaign (made)")
+    assert not Path(out).exists()
+    code, told = report_of(few)
+    assert code == EXIT_DONE
+    assert "it is of 4 samples that have run of 4, and" in told
+    assert "has 6 of 8" in told
+    code, told = report_of(tmp_path)
+    assert (code, "--analysis" in told) == (EXIT_DONE, False)
+
+
+@pytest.mark.usefixtures("_undrawn")
 def test_verdicts_are_those_of_the_analysis_and_nothing_counts_again() -> None:
     campaign = made_campaign(8, failed=(2, 5), stalled=(4,))
     text, found = page(campaign, "runs/made"), analyse(campaign)
