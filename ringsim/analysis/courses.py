@@ -23,6 +23,7 @@ MOST, FEWER = 401, 101
 HELD_BYTES = 200 << 20
 """Angles that are held at once."""
 _ANGLE = "opening_angle"
+_TIMES = ("deployment_time", "final_time")
 _PASSES = 4
 """Times that the file is read for MOST records, at most."""
 Numbers = NDArray[np.float32]
@@ -90,7 +91,9 @@ class Courses:
 
 def deployed(campaign: xr.Dataset) -> Mask:
     """Which rings came to 180 deg and stay there, as no latch missed its catch, (sample,)."""
-    open_once = np.asarray(np.isfinite(campaign["deployment_time"].to_numpy()))
+    open_once = np.asarray(np.isfinite(numbers(campaign, "deployment_time")))
+    if "deployment_time" not in campaign:  # the file leaves it out
+        open_once = np.asarray(numbers(campaign, "outcome") == int(Fate.DEPLOYED))
     missed = np.zeros(len(open_once), dtype=bool)
     if "outcome" in campaign:
         missed |= campaign["outcome"].to_numpy() == int(Fate.NOT_LATCHED)
@@ -101,14 +104,17 @@ def deployed(campaign: xr.Dataset) -> Mask:
 
 
 def names_of_ends(campaign: xr.Dataset) -> list[str]:
-    """What ``ends`` reads of a campaign beside its times."""
-    return [n for n in ("outcome", "latched_joints", "locked_joints") if n in campaign]
+    """What ``ends`` reads of a campaign."""
+    return [
+        name for name in ("outcome", "latched_joints", "locked_joints", *_TIMES) if name in campaign
+    ]
 
 
 def ends(campaign: xr.Dataset) -> Array:
     """When each run was over: its last lock where the ring stays open, or its end; s, (sample,)."""
-    final, time = campaign["final_time"].to_numpy(), campaign["time"].to_numpy()
-    found = np.where(deployed(campaign), campaign["deployment_time"].to_numpy(), final)
+    opened, final = (numbers(campaign, name) for name in _TIMES)
+    time = campaign["time"].to_numpy()
+    found = np.where(deployed(campaign) & np.isfinite(opened), opened, final)
     return np.asarray(np.where(np.isfinite(found), found, time[-1]), dtype=float)
 
 
@@ -176,7 +182,7 @@ def _rows(campaign: xr.Dataset, at: Places) -> Iterator[tuple[Numbers, Places]]:
     and which samples they are.
     """
     time = campaign["time"].to_numpy()
-    names = [_ANGLE, "status", "deployment_time", *names_of_ends(campaign)]
+    names = [_ANGLE, "status", *names_of_ends(campaign)]
     for block in blocks(campaign, names):
         block = block.isel(sample=np.flatnonzero(good(block)))
         angles = block[_ANGLE].transpose("sample", "plane", "section", "time").to_numpy()

@@ -153,6 +153,8 @@ def _or_dash(value: float) -> str:
 
 def _other_ends(campaign: xr.Dataset) -> list[str]:
     """A line if the engines do not agree on what the antenna did."""
+    if not {"outcome", f"outcome{CHECKED}"} <= set(campaign):  # the file leaves it out
+        return []
     frame, full = (campaign[f"outcome{end}"].to_numpy() for end in ("", CHECKED))
     ok = (campaign["status"] == Status.OK) & (campaign[f"status{CHECKED}"] == Status.OK)
     other = np.flatnonzero(ok.to_numpy() & (frame != full))

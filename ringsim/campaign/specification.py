@@ -43,7 +43,7 @@ from ringsim.sampling.table import (
     with_own_places,
 )
 from ringsim.scene import Scene, load_scene
-from ringsim.storage.netcdf import OutputTable
+from ringsim.storage.netcdf import PER_SAMPLE, OutputTable
 from ringsim.units import ListIn, Model
 from ringsim.variables import GONE, OF_CAMPAIGNS
 
@@ -149,6 +149,16 @@ class Specification(Model):
                 raise ValueError(
                     f"max_difference.{name}: this is not an output that can be compared between "
                     f"engines ({known_or_nearest(name, quantities())})"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_left_out(self) -> "Specification":
+        for name in self.output.leave_out:
+            if name in PER_SAMPLE:
+                raise ValueError(
+                    f"output.leave_out: {name} says how each sample ended, without which the file "
+                    "cannot be read: take it out of the list"
                 )
         return self
 

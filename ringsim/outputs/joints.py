@@ -103,9 +103,12 @@ class Asynchrony(Output):
         return values
 
     def told(self, values: Values, span_names: SpanNames) -> str:
-        """As "at 16.1 s: upper 10 behind lower 2"; empty if all joints are told alike."""
-        known = str(values.get("asynchrony_leader_plane", ""))
-        if not (known and values["asynchrony_max"] >= _TOLD):
+        """As "at 16.1 s: upper 10 behind lower 2"; empty if all joints are told alike, or a file
+        has left out who they are.
+        """
+        if any(variable.name not in values for variable in self.variables if not variable.dims):
+            return ""
+        if not str(values["asynchrony_leader_plane"]) or values["asynchrony_max"] < _TOLD:
             return ""
         time, size = (float(values[f"asynchrony_max{end}"]) for end in ("_time", ""))
         joints, dims = list[str](), ("plane", "section")

@@ -348,7 +348,7 @@ def _course(
     at = np.unique(np.linspace(0, last, min(last + 1, _RECORDS)).round().astype(int))
     if "sample" not in dataset.dims:
         return time[at], _over_places(dataset[name], name).isel(time=at).to_numpy()[None]
-    about = [each for each in ("status", "deployment_time") if each in dataset]
+    about = ["status"] if "status" in dataset else []
     parts, samples = [], [np.empty(0, dtype=np.int64)]
     for block in blocks(dataset, [name, *about, *names_of_ends(dataset)]):
         own = used(block)

@@ -150,7 +150,8 @@ def _locks(
         return [None] * (campaign.sizes["plane"] * campaign.sizes["section"]), last
     latched = scene.stop is not None and scene.stop.latch
     times = one["lock_time"].transpose("sample", "plane", "section").to_numpy().ravel().tolist()
-    end = max(last, float(one["deployment_time"][0]))
+    known = one["deployment_time"].values.tolist() if "deployment_time" in one else times
+    end = max(last, *known)
     return [round(time, 4) if latched or time > last else None for time in times], end
 
 

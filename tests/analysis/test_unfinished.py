@@ -7,13 +7,21 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
+from made_campaign import made_campaign, with_motors
 
 from made import drawn_campaign, ishigami
+from ringsim.analysis.campaign_notes import notes
+from ringsim.analysis.engines import check_lines
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import told
+from ringsim.analysis.study_text import told, verdict_lines
+from ringsim.outputs.family import VARIABLES
+from ringsim.plots import figures as of_campaigns
 from ringsim.plots.campaign.tornado import bars_of
+from ringsim.refusal import InputError
+from ringsim.report.page import page
 from ringsim.sampling.designs.blocks import Morris, Saltelli
 from ringsim.sampling.designs.independent import RandomDesign, Sobol
+from ringsim.storage.netcdf import PER_SAMPLE
 from ringsim.variables import Fate
 
 pytestmark = pytest.mark.quick
@@ -70,6 +78,55 @@ def test_parts_are_of_what_has_run_in_any_order():
     assert len(np.unique(first)) == 4
     line = next(line for line in told(found) if re.match(r"asynchrony_max +(deg )? +-?\d", line))
     assert line.split()[-1] == str(len(values))
+
+
+def with_everything():
+    """A small campaign with motors, checks by the other engine, and who leads and lags."""
+    made = with_motors(made_campaign(6, failed=(1,), stalled=(4,), not_run=(5,)))
+    held = made["status"].values == 0
+    for who, section in (("leader", 4), ("laggard", 1)):
+        made[f"asynchrony_{who}_plane"] = "sample", np.where(held, "upper", "").astype(object)
+        made[f"asynchrony_{who}_section"] = "sample", np.where(held, section, -1)
+    made["asynchrony_max_time"] = "sample", np.where(held, 5.0, np.nan)
+    for name in ("locked_joints", "latched_joints"):
+        made[name] = "sample", np.where(held, 8, -1).astype("i4")
+    for name in ("status", "outcome", "reason", "deployment_time", "asynchrony_max"):
+        made[f"{name}_checked"] = made[name]
+    made.attrs |= {"check_every": 1, "requirements": "{}"}
+    return made
+
+
+_LEFT_OUT = [
+    str(name) for name, each in with_everything().data_vars.items()
+    if name in VARIABLES and name not in PER_SAMPLE and each.attrs.get("role") is None
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", _LEFT_OUT)
+def test_a_file_may_leave_out_any_of_its_variables(name, monkeypatch):
+    """What merging, analyse, report and Python tell of the others is the same."""
+    whole = with_everything()
+    less = whole.drop_vars([name, f"{name}_checked"], errors="ignore")
+    told_of = [*notes(less), *verdict_lines(less), *check_lines(less)]
+    assert told_of[-1]
+    assert ("deployed: 3 of 5" in told_of) == (name != "outcome")
+    analysis = analyse(less)
+    if name != "peak_tension":
+        assert analysis["peak_tension"].sel(statistic="mean") == np.mean([20.0, 22.0, 23.0, 24.0])
+    monkeypatch.setattr(of_campaigns, "PICTURES", [])
+    assert "runs/made" in page(less, "runs/made", analysis)
+    for ask in ("tables", "worst", "outcomes"):
+        assert len(getattr(less.ring, ask)())
+    for ask in {"fan", "leader"} - _NEEDED.get(name, set()):
+        xr.testing.assert_equal(getattr(less.ring, ask)(), getattr(whole.ring, ask)())
+    for ask in _NEEDED.get(name, ()):
+        with pytest.raises(InputError, match=name):
+            getattr(less.ring, ask)()
+
+
+_NEEDED = {f"asynchrony_{who}_{dim}": {"leader"}
+           for who in ("leader", "laggard") for dim in ("plane", "section")}  # fmt: skip
+_NEEDED |= {"opening_angle": {"fan"}}
 
 
 def test_indices_and_their_figure_leave_out_blocks_that_have_not_run():

@@ -113,6 +113,11 @@ def test_example_in_the_guide_can_be_drawn(tmp_path):
             '[output]\nleave_out = ["opening_angel"]\n[inputs]',
             r"opening_angel is not an output variable \(did you mean opening_angle\?\)",
         ),
+        (
+            "[inputs]",
+            '[output]\nleave_out = ["lock_time", "cause"]\n[inputs]',
+            r"output\.leave_out: cause says how each sample ended, .*: take it out of the list",
+        ),
     ],
 )
 def test_mistakes_are_refused_in_one_line(old, new, words, tmp_path):

@@ -285,8 +285,7 @@ def laid_on(grid: Array, angle: Array, margins: Array) -> Array:
 )  # fmt: skip
 def motors(campaign: xr.Dataset) -> Figure:
     """A row a motor, from ``motor_torque`` and ``motor_speed`` (sample, plane, winch, time)."""
-    names = ["motor_torque", "motor_speed", "final_time", "deployment_time"]
-    names += names_of_ends(campaign)
+    names = ["motor_torque", "motor_speed", *names_of_ends(campaign)]
     read, words = chosen(campaign, names)
     # Motors that have done their work stand still, and would hide those that still wind.
     read = read.where(read["time"] <= xr.DataArray(ends(read), dims="sample"))
@@ -381,8 +380,7 @@ def _by_joint(campaign: xr.Dataset, name: str, subject: str, least: float = np.n
 def peaks(campaign: xr.Dataset) -> xr.DataArray:
     """Largest recorded tension of each span until the last lock, (sample, plane, span), N."""
     found = []
-    names = ["cable_tension", "status", "final_time", "deployment_time"]
-    for block in blocks(campaign, [*names, *names_of_ends(campaign)]):
+    for block in blocks(campaign, ["cable_tension", "status", *names_of_ends(campaign)]):
         own = used(block)
         until = xr.DataArray(ends(own), dims="sample")
         found.append(own["cable_tension"].where(own["time"] <= until).max("time", keep_attrs=True))
