@@ -33,6 +33,7 @@ from ringsim.analysis.intervals import (
     good,
     lost,
     numbers,
+    quantities,
     ran,
     used,
     worst_sample,
@@ -116,8 +117,7 @@ def ending_lines(
             why = f"sample {called[0]}: {why}"
         told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
         told = "" if word in REACHED else told
-        over = word in [each.words for each in GO_ON]
-        if opened is not None and over and opened[own].any():
+        if opened is not None and word in [each.words for each in GO_ON] and opened[own].any():
             told = f", {int(opened[own].sum())} of them opened all the same{told}"
         if word != UNKNOWN:
             lines.append(f"{word.removeprefix(LOST)}: {len(own)} of {run}{told}")
@@ -240,8 +240,7 @@ def records_line(campaign: xr.Dataset, names: Collection[str] = ()) -> str:
     are apart; empty if none is.
     """
     found = derived.of_records(derived.known_from(campaign.attrs))
-    if names:
-        found = [name for name in found if name in names]
+    found = [name for name in found if not names or name in names]
     if not found:
         return ""
     scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
@@ -416,7 +415,8 @@ def marked(table: Table, analysis: xr.Dataset, column: int = 0, safe: Sequence[s
     rows, own = [], False
     for row in table.rows:
         # A blank repeats the one above.
-        own = row[0].startswith((_OF_LOSSES, *safe)) if row[0] else own
+        if row[0]:  # an output of the user's own may begin so, too
+            own = row[0].startswith((_OF_LOSSES, *safe)) and row[0].split()[0] not in quantities()
         mark = "" if own else MARK
         rows.append((*row[:column], f"{row[column]}{mark}", *row[column + 1 :]))
     return table._replace(rows=rows)

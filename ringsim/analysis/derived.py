@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationInfo
 
 from ringsim import extensions
 from ringsim.outputs import COORDINATES, OUTPUTS, VARIABLES, Output
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.tables import unit_text
 from ringsim.units import Model
-from ringsim.variables import OF_CAMPAIGNS, Variable
+from ringsim.variables import OF_CAMPAIGNS, Fate, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,6 +39,40 @@ _OF_FILES = (
 """What campaigns and their analyses hold beside inputs and outputs."""
 _ENDINGS = ("_checked", "_error", "_interval", "_samples")
 """How names end that files make of those of outputs."""
+_FAMILIES = {
+    "balance": "largest median sample", "bound": "", "case": "change outcome sample",
+    "chance": "level", "change": "input listed of ratio untold values",
+    "changed": "outcome_first outcome_second sample_first sample_second",
+    "confidence": "lower required upper", "counted": "", "effect": "deviation", "event": "",
+    "factor": "", "failed": "", "first": "order_index", "given": "data_index", "group": "",
+    "index": "lost used", "input": "is_place of span", "inputs": "held",
+    "kept": "compared share share_difference verdict verdict_text",
+    "kind": "compared share share_difference",
+    "limit": "beyond margin of output sample text value", "mean": "absolute_effect effect",
+    "missing": "by_inputs lost", "numerical": "", "other": "factor",
+    "outcome": "lost of open share share_convergence",
+    "output": "units", "pair": "correlation first second share", "part": "",
+    "probability": "lower required upper", "requirement": "text",
+    "reweighted": "bounds probability share share_decisive statistic to verdict",
+    "samples": "close lost may_be_off short unsure used violating without_value",
+    "second": "order_index", "separation": "chance", "setting": "first second", "side": "",
+    "source": "", "statistic": "",
+    "tail": "agreement checked checked_outside confirmed difference ended levels lost missed "
+            "nearest probability probability_moved reached_probability replicate "
+            "replicate_probability unled variation variation_of_chains",
+    "together": "confidence lost of probability_lower probability_upper", "total": "index",
+    "verdict": "may_change of_used", "worst": "failed failure found inputs of sample",
+}  # fmt: skip
+"""What analyses and comparisons hold beside numbers of outputs: ``first`` and ``first_second``."""
+_OF_ANALYSES = {*_FAMILIES} | {
+    f"{first}_{second}" for first, words in _FAMILIES.items() for second in words.split()
+}
+_OF_OUTPUTS = (
+    "convergence", "difference", "doubtful", "end_sample", "error_of_mean", "largest_difference",
+    "largest_difference_sample", "largest_error_sample", "mean", "partial_rank_correlation",
+    "rank_correlation", "reweighted", "same_within", "spread", "worst_sample",
+)  # fmt: skip
+"""What they hold of each output, behind its name."""
 _DECLARED: dict[str, type[Output]] = {}
 """Derived outputs by name, each a kind of output that no run computes."""
 
@@ -111,12 +145,23 @@ def _listed(table: Any) -> Any:
     return {name: {"of": each} if isinstance(each, str) else each for name, each in table.items()}
 
 
-def _check(outputs: dict[str, Derived]) -> dict[str, Derived]:
+def _of_analyses(outputs: Iterable[str]) -> set[str]:
+    """Names that analyses and comparisons give to something else, also of these outputs."""
+    own = {n for n, each in VARIABLES.items() if not each.dims and n not in _DECLARED} | {*outputs}
+    found = {f"{name}_{word}" for name in own for word in _OF_OUTPUTS}
+    return found | {f"case_{name}" for name in own} | _OF_ANALYSES | {each.word for each in Fate}
+
+
+def _check(outputs: dict[str, Derived], info: ValidationInfo) -> dict[str, Derived]:
     """Refuse what cannot be computed, or means something already; make the rest known."""
+    # What a file holds of an older version may still be read.
+    taken = _of_analyses(outputs) if info.context is not _STORED else set[str]()
     for name, each in outputs.items():
         known = {*(VARIABLES.keys() - _DECLARED.keys()), *COORDINATES, *FUNCTIONS, *_OF_FILES}
         if name in known or name.endswith(_ENDINGS):
             raise ValueError(f"{name} means something already: choose another name")
+        if name in taken:
+            raise ValueError(f"{name} is what analyses call something else: choose another name")
         if not name.isidentifier() or not name.isascii() or name.startswith("_"):
             raise ValueError(
                 f"{show(name)} must be a name of letters, digits and underscores, such as peak_rate"
@@ -147,6 +192,8 @@ def _check(outputs: dict[str, Derived]) -> dict[str, Derived]:
 Outputs = Annotated[dict[str, Derived], BeforeValidator(_listed), AfterValidator(_check)]
 """Derived output by name; in files a text, or a table with ``of``."""
 _ADAPTER = TypeAdapter(Outputs)
+_STORED = {"stored": True}
+"""Context of outputs that a file holds already."""
 
 
 def declare(outputs: Mapping[str, Derived]) -> None:
@@ -182,7 +229,7 @@ def known_from(attributes: Mapping[Any, Any]) -> dict[str, Derived]:
     """
     extensions.load(extensions.names_of(str(attributes.get("scene", ""))))
     text = str(attributes.get("outputs", ""))
-    return _ADAPTER.validate_json(text) if text else {}
+    return _ADAPTER.validate_json(text, context=_STORED) if text else {}
 
 
 def of_records(outputs: Mapping[str, Derived]) -> list[str]:

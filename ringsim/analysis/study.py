@@ -210,7 +210,8 @@ def cases(campaign: xr.Dataset) -> xr.Dataset:
 
 
 def _bent(found: xr.Dataset) -> list[str]:
-    """The variables that lost runs bend if these go with inputs: those that the others alone tell.
+    """The variables that lost runs bend if these go with inputs: those that the others alone tell,
+    among them all of outputs, whatever these are called.
 
     Verdicts, their bounds and shares of outcomes count lost runs, and counts are what they are.
     """
@@ -219,10 +220,12 @@ def _bent(found: xr.Dataset) -> list[str]:
         "balance",
     )  # fmt: skip
     safe = ("_samples", "_lower", "_upper", "_required", "_bounds", "_verdict", "_text", "_units")
+    own, heads = quantities(), tuple(f"{name}_" for name in quantities())
     return [
-        str(name) for name, each in found.variables.items()
+        name for name, each in ((str(n), v) for n, v in found.variables.items())
         if name not in found.coords and each.dtype.kind == "f"
-        and not str(name).startswith(of_all) and not str(name).endswith(safe)
+        and (name in own or not name.endswith(safe))
+        and (name in own or name.startswith(heads) or not name.startswith(of_all))
     ]  # fmt: skip
 
 

@@ -15,13 +15,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from made_campaign import made_campaign
-from pydantic import ValidationError
+from made_campaign import made_campaign, with_motors
+from pydantic import TypeAdapter, ValidationError
 
+from made import drawn_campaign
 from ringsim import InputError, analyse, compare
 from ringsim.analysis import derived
 from ringsim.analysis.comparison_text import sections
 from ringsim.analysis.derived import FUNCTIONS, Derived, over_samples
+from ringsim.analysis.intervals import quantities
 from ringsim.analysis.study_text import statistics_table, told, verdict_lines
 from ringsim.campaign import merging
 from ringsim.campaign.specification import Campaign, campaign_of
@@ -32,6 +34,9 @@ from ringsim.plots.campaign.numbers import convergence
 from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.report.dossier import dossier
 from ringsim.report.page import page
+from ringsim.sampling.designs.blocks import Morris, Saltelli
+from ringsim.sampling.designs.independent import RandomDesign
+from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.storage import netcdf
 from ringsim.variables import Status
 
@@ -340,7 +345,7 @@ last_section = "argmax(max(max(opening_angle, over='plane'), over='time'), over=
 @pytest.mark.parametrize(
     "name",
     ["peak_tension", "section", "max", "_own", "a b", "lück", "sample", "log", "overrides",
-     "x_checked"],
+     "x_checked", "missing"],
 )  # fmt: skip
 def test_names_that_mean_something_are_refused(name: str) -> None:
     with pytest.raises(InputError, match="outputs"):
@@ -470,3 +475,65 @@ def test_what_expressions_read_may_be_left_out_of_the_file(
     assert "pull_difference" not in told
     assert "output pull" in told["setting"].values
     assert "pull_difference" in compare(found[0], found[0])
+
+
+def _made() -> Iterator[xr.Dataset]:
+    """Analyses and comparisons that between them have all that there is."""
+    required = {"asynchrony_max": {"max": 3.0, "probability": 0.9, "confidence": 0.9}}
+    law = {"x1": {"kind": "uniform", "low": 0.0, "high": 0.9}}
+
+    def drawn(design: Any) -> xr.Dataset:
+        return drawn_campaign(design, lambda x: 3 * x[:, 0] + x[:, 1] ** 2, 2, 1)
+
+    yield analyse(drawn(RandomDesign(samples=200)), required, law)
+    yield analyse(drawn(Saltelli(samples=512, second_order=True)), required)
+    yield analyse(drawn(Morris(samples=60)), required)
+    levels = SubsetSimulation(of="asynchrony_max", above=1.0, samples=100, share=0.1, replicates=4)
+    first = np.linspace(0.0, 2.0, 100), np.zeros(100, dtype=bool)
+    yield analyse(drawn(levels.knowing(levels.responses(*first))))
+    many = with_motors(made_campaign(12, failed=(1,), stalled=(4, 6)))
+    yield analyse(many)
+    yield analyse(many.assign_attrs(design='{"kind": "one-at-a-time"}'))
+    yield compare(many, many.assign(asynchrony_max=1.1 * many["asynchrony_max"]))
+
+
+def test_no_name_is_taken_that_analyses_give_themselves() -> None:
+    """All that they make is refused as the name of an output; those of others beside them not."""
+    own = quantities().keys()
+    names = {str(name) for each in _made() for name in (*each.variables, *each.dims)} - own
+    assert len(names) > 250
+    free = [name for name in sorted(names) if not _taken(name)]
+    assert not free
+    assert {"asynchrony_max_same_within", "case_peak_tension", "first_order_index"} <= names
+    assert _taken("apart_mean", apart="max(asynchrony)")
+    for name in ("apart_mean", "failed_latches", "tail_lag", "input_power", "latch_rate_mean"):
+        assert not _taken(name)
+
+
+def _taken(name: str, **more: str) -> bool:
+    try:
+        TypeAdapter(derived.Outputs).validate_python({name: "max(asynchrony)", **more})
+    except ValidationError as error:
+        return "choose another name" in str(error)
+    return False
+
+
+def test_outputs_may_begin_as_other_names_do() -> None:
+    """They are from the runs that hold, as all others are; a file of before is still read."""
+    made = made_campaign(60)
+    force = np.random.default_rng(1).normal(size=60)
+    made["rods_young_modulus"][:] = force
+    gone = force > 0.5
+    made["status"] = made["status"].where(~gone, Status.DIVERGED).astype("i1")
+    names = ("failed_latches", "tail_lag", "peak_lower")
+    for k, name in enumerate(names):
+        made[name] = "sample", np.where(gone, np.nan, (k + 1) * force), {"units": "1"}
+    made.attrs["outputs"] = json.dumps({name: {"of": "max(asynchrony)"} for name in names})
+    found = analyse(made)
+    lines = statistics_table(found).lines()
+    for name in names:
+        assert any(line.startswith(f"{name} *") for line in lines)
+        for ending in ("", "_interval", "_convergence"):
+            assert "lost_runs" in found[f"{name}{ending}"].attrs
+    assert "lost_runs" not in found["outcome_share"].attrs
+    derived.known_from({"outputs": '{"missing": {"of": "max(asynchrony)"}}'})
