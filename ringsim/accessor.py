@@ -69,11 +69,6 @@ class Ring:
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
-        from ringsim.analysis.derived import known_from
-        from ringsim.refusal import InputError
-
-        with contextlib.suppress(InputError):  # told by what needs a module that is not there
-            known_from(dataset.attrs)
 
     def __repr__(self) -> str:
         """What it is of, and what it can be asked."""
@@ -105,11 +100,12 @@ class Ring:
         from ringsim.plots import figures
         from ringsim.refusal import InputError, known_or_nearest
 
-        if name is not None and name not in (known := figures.names_for(self._dataset)):
+        dataset = self._whole()
+        if name is not None and name not in (known := figures.names_for(dataset)):
             hint = known_or_nearest(name, known)
             raise InputError(f"plot({name!r}): this dataset has no such figure ({hint})")
         drawn = Figures()
-        for each, figure in figures.figures_of(self._dataset, name):
+        for each, figure in figures.figures_of(dataset, name):
             # A notebook shows it so also where pyplot has not told it how.
             vars(figure)["_repr_png_"] = functools.partial(figures.as_png, figure)
             drawn[each.name] = figure
@@ -125,7 +121,7 @@ class Ring:
         from ringsim.analysis.residuals import residual_statistics, residuals
         from ringsim.measured import load_measured
 
-        return residual_statistics(residuals(self._dataset, load_measured(measured)))
+        return residual_statistics(residuals(self._known(), load_measured(measured)))
 
     def leader(self) -> xr.Dataset:
         """Which V-joint is most open and which least.
@@ -139,7 +135,7 @@ class Ring:
         from ringsim.analysis import influence
 
         found = influence.often if "sample" in self._dataset.dims else influence.over_time
-        return found(self._dataset).assign_attrs(self._losses())
+        return found(self._whole()).assign_attrs(self._losses())
 
     def outcomes(self) -> "pd.DataFrame":
         """What became of the samples of a campaign: a row for each kind of outcome and of loss.
@@ -155,7 +151,8 @@ class Ring:
         from ringsim.analysis.study import outcomes
 
         self._require_samples("outcomes")
-        found = outcomes(self._dataset, placement(self._dataset))
+        dataset = self._known()
+        found = outcomes(dataset, placement(dataset))
         columns = ("samples", "of", "lost", "share")
         known = found[[f"outcome_{name}" for name in columns]]
         rows = known.to_dataframe().set_axis(columns, axis=1)
@@ -180,7 +177,7 @@ class Ring:
         from ringsim.analysis.study_text import sections
         from ringsim.dataset import with_plain_attributes
 
-        own = with_plain_attributes(self._dataset)
+        own = with_plain_attributes(self._whole())
         analysis = own if "statistic" in own.dims else analyse(own)
         found, times = dict[str, pd.DataFrame](), Counter[str]()
         for each in sections(analysis, self._folder(), full=full).values():
@@ -207,7 +204,7 @@ class Ring:
 
         self._require_samples("a dossier")
         found = {}
-        for table in dossier(self._dataset, test=test):
+        for table in dossier(self._whole(), test=test):
             found[table.title] = pd.DataFrame(table.rows, columns=table.head)
             found[table.title].attrs["notes"] = list(table.notes)
         return found
@@ -231,13 +228,34 @@ class Ring:
         from ringsim.analysis.worst import COLUMNS, command, worst
 
         self._require_samples("worst samples")
-        stand, wanted = population_of(self._dataset), required_by(self._dataset.attrs)
-        found = worst(stand, wanted, influence(stand, wanted, placement(self._dataset)))
+        dataset = self._whole()
+        stand, wanted = population_of(dataset), required_by(dataset.attrs)
+        found = worst(stand, wanted, influence(stand, wanted, placement(dataset)))
         columns: dict[str, Any] = {
             name: found[f"worst_{name}"].to_numpy() if found else [] for name in COLUMNS
         }
         again = [command(self._folder(), sample) for sample in columns["sample"]]
         return pd.DataFrame(columns | {"replay": again})
+
+    def _known(self) -> xr.Dataset:
+        """The dataset, samples by their numbers; its own outputs mean what they mean in it, though
+        another campaign is open that has others.
+        """
+        from ringsim.analysis.derived import known_from
+        from ringsim.dataset import in_order
+        from ringsim.refusal import InputError
+
+        with contextlib.suppress(InputError):  # told by what needs a module that is not there
+            known_from(self._dataset.attrs)
+        return in_order(self._dataset)
+
+    def _whole(self) -> xr.Dataset:
+        """The same with all planes, sections and others of its scene; InputError if some are not
+        there.
+        """
+        from ringsim.dataset import as_in_scene
+
+        return as_in_scene(self._known())
 
     def _folder(self) -> str:
         """The folder that the dataset was opened from, by default runs/NAME."""
@@ -258,9 +276,10 @@ class Ring:
         from ringsim.refusal import InputError
 
         self._require_samples("a fan")
-        if "opening_angle" not in self._dataset:
+        dataset = self._whole()
+        if "opening_angle" not in dataset:
             raise InputError("a fan needs opening_angle, which this campaign has left out")
-        found = courses(self._dataset, quantiles)
+        found = courses(dataset, quantiles)
         if not len(found.samples):
             raise InputError("a fan needs a sample that has run, and none has")
         return found.bands.assign_attrs(self._losses())
@@ -269,7 +288,7 @@ class Ring:
         """The attributes that mark what lost runs bend or may be off; none for a run."""
         from ringsim.analysis.campaign_notes import attributes
 
-        dataset = self._dataset
+        dataset = self._known()
         campaign = "sample" in dataset.dims and "status" in dataset
         return {k: v for k, v in attributes(dataset).items() if v} if campaign else {}
 

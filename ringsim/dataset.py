@@ -1,5 +1,6 @@
 """A run as an xarray dataset, and datasets as netCDF files."""
 
+import contextlib
 import json
 import platform
 import tomllib
@@ -21,7 +22,7 @@ from ringsim.files import require_file, require_regular, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, axes, holds, span_names
 from ringsim.refusal import InputError
-from ringsim.scene import Scene
+from ringsim.scene import Scene, scene_from_toml
 from ringsim.stored_state import layout_fingerprint
 from ringsim.variables import OF_CAMPAIGNS, Fidelity, Outcome, Variable, flags_of
 
@@ -103,6 +104,49 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
             draft, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset),
             unlimited_dims=[],
         )  # fmt: skip
+
+
+def in_order(found: xr.Dataset) -> xr.Dataset:
+    """The samples of a campaign by their numbers, and records by time, however they were selected:
+    what analyses and figures tell of them goes by their places.
+
+    InputError if no sample is left.
+    """
+    for dim in ("sample", "time"):
+        rising = dim not in found.indexes or found.indexes[dim].is_monotonic_increasing
+        found = found if rising else found.sortby(dim)
+    if found.sizes.get("sample") == 0:
+        raise InputError("no sample is left in this selection: select one at least")
+    return found
+
+
+def as_in_scene(found: xr.Dataset) -> xr.Dataset:
+    """The same with planes, sections, spans and others as the scene of a run or a campaign counts
+    them, since what is drawn of them goes by their places.
+
+    InputError if some of them are not there.
+    """
+    found, known = in_order(found), dict[str, NDArray[Any]]()
+    if "scene" in found.attrs:
+        with contextlib.suppress(InputError):  # told by what needs the scene
+            known = axes(scene_from_toml(str(found.attrs["scene"]), source="attribute scene"))
+    for dim in (each for each in known if each in found.coords):
+        held, wanted = found[dim].values, f"each {dim} of the scene"
+        if dim == "time":
+            whole, wanted = held, "a dimension"
+        elif dim in ("plane", "section", "axis"):
+            whole = known[dim]
+        else:  # of spans and others samples may have more than the scene
+            whole = np.arange(1, held.size + 1)
+        if held.ndim == 0 or not held.size or not {*whole.tolist()} <= {*held.tolist()}:
+            told = ", ".join(map(str, np.atleast_1d(held).tolist()[:6])) or "none"
+            raise InputError(
+                f"{dim} is only {told} in this selection, and must be {wanted}: ask the whole "
+                "dataset, and select from the answer"
+            )
+        turned = len(held) == len(whole) and not np.array_equal(held, whole)
+        found = found.sel({dim: whole}) if turned else found
+    return found
 
 
 def with_plain_attributes(found: xr.Dataset) -> xr.Dataset:

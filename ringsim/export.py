@@ -11,6 +11,7 @@ import scipy
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.dataset import as_in_scene
 from ringsim.files import whole
 from ringsim.layout.bodies import Array
 from ringsim.outputs import VARIABLES
@@ -92,7 +93,7 @@ def size_of_csv(dataset: xr.Dataset) -> float:
     and numbers have as many digits as they need.
     """
     share, found = 1.0, 0.0
-    if {"time", "final_time"} <= set(dataset.variables) and dataset.sizes["time"] > 1:
+    if "final_time" in dataset and dataset.sizes.get("time", 0) > 1:
         ended = np.nan_to_num(dataset["final_time"].to_numpy() / float(dataset["time"][-1]))
         share = float(np.clip(ended, 0.0, 1.0).mean())
     for dims, names in _tables(dataset).items():
@@ -260,8 +261,9 @@ def write_pvd(run: xr.Dataset, folder: Path, stem: str) -> list[Path]:
     elsewhere); lines ``part``, a number whose meaning the file tells, ``lag`` of the joint that
     they end at and, if recorded, ``stress`` (Pa).
 
-    InputError if nothing was recorded.
+    InputError if nothing was recorded, or not all planes and sections of its scene are there.
     """
+    run = as_in_scene(run)
     path, inner = folder / f"{stem}.pvd", folder / f"{stem}-vtu"
     try:
         shape = shape_of(run, scene_from_toml(str(run.attrs["scene"]), source="attribute scene"))

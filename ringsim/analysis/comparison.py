@@ -37,6 +37,7 @@ from ringsim.analysis.requirements import (
 from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.verdicts import Verdict, judge, verdict_about, verdict_text
 from ringsim.analysis.worst import margins_of
+from ringsim.dataset import in_order
 from ringsim.outputs.base import may_be_off
 from ringsim.overrides import flat, with_names
 from ringsim.refusal import InputError, show
@@ -406,7 +407,7 @@ def _numbered(dataset: xr.Dataset) -> xr.Dataset:
         if name not in dataset:
             raise InputError(f"it has no {name}: give campaigns or runs of this version of ringsim")
     if "sample" in dataset.dims:
-        return dataset
+        return in_order(dataset)
     scalars = dataset[[name for name, v in dataset.variables.items() if not v.dims]]
     return scalars.expand_dims(sample=[0])
 

@@ -560,10 +560,10 @@ def open_stored(path: Path) -> xr.Dataset:
                 cure = "no sample has run yet: run ringsim campaign with the same file again"
             raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
     # Here, as in other files that runs load: it takes most of a second.
-    from ringsim.dataset import open_lazily
+    from ringsim.dataset import in_order, open_lazily
 
     try:
-        found = open_lazily(file)
+        found = in_order(open_lazily(file))
         if (most := max(found.sizes.values(), default=0)) > _MOST_ENTRIES:
             found.close()
             raise InputError(

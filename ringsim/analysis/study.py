@@ -72,6 +72,7 @@ from ringsim.analysis.worst import (
     worst,
 )
 from ringsim.choice import kind_of
+from ringsim.dataset import in_order
 from ringsim.files import parse_toml, read_text
 from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.refusal import InputError
@@ -132,7 +133,7 @@ def analyse(
             "this is not a campaign: give the folder that ringsim campaign has written, or its "
             "campaign.nc"
         )
-    own = known_from(campaign.attrs)
+    own, campaign = known_from(campaign.attrs), in_order(campaign)
     placed = placement(campaign)
     if requirements is None:
         requirements = required_by(campaign.attrs)

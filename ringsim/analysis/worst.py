@@ -87,7 +87,7 @@ def unusual(
     other than in its base case, the first of the ``whole`` campaign; of a list of cases first their
     labels, and what most of them have otherwise.  A drawn fault is always told.
     """
-    if one_at_a_time(campaign):
+    if one_at_a_time(campaign if whole is None else whole):
         return [other_than_base(campaign, place, whole) for place in places]
     variables = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     columns, found, both = drawn(campaign), list[str](), planes_apart(campaign)
@@ -174,8 +174,8 @@ def _columns(variable: xr.DataArray) -> list[tuple[str, NDArray[Any]]]:
 
 
 def one_at_a_time(campaign: xr.Dataset) -> bool:
-    """Whether each sample differs from the first one, the base case, by one change."""
-    return bool(placement(campaign).kind == "one-at-a-time")
+    """Whether each sample differs from sample 0, the base case, by one change; not without it."""
+    return placement(campaign).kind == "one-at-a-time" and 0 in campaign["sample"].values
 
 
 def other_than_base(campaign: xr.Dataset, place: int, whole: xr.Dataset | None = None) -> str:

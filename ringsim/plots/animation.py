@@ -21,6 +21,7 @@ from matplotlib.colors import (
 from matplotlib.figure import Figure
 from PIL import Image
 
+from ringsim.dataset import as_in_scene
 from ringsim.files import whole, writing
 from ringsim.plots import style
 from ringsim.plots.ring import LOOKS, OTHER, facing_azimuth, view
@@ -68,8 +69,10 @@ def animate(run: xr.Dataset, path: Path, colour: str = "lag") -> Path:
     drawing is to be what was computed; ``colour`` is "lag" (deviation from the mean opening angle)
     or "stress", which needs ``rod_stress``.
 
-    InputError if it recorded nothing to draw, or no stress, or the file cannot be written.
+    InputError if it recorded nothing to draw, or no stress, or not all planes and sections of its
+    scene are there, or the file cannot be written.
     """
+    run = as_in_scene(run)
     try:
         shape = shape_of(run, scene_from_toml(str(run.attrs["scene"]), source="attribute scene"))
     except ValueError as error:

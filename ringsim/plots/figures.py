@@ -21,6 +21,7 @@ from PIL import Image
 
 from ringsim.analysis.courses import any_finite
 from ringsim.choice import load_package
+from ringsim.dataset import as_in_scene
 from ringsim.files import whole, writing
 from ringsim.plots import NO_JOINTS, Picture, barred, jointed, known, style
 
@@ -30,14 +31,17 @@ PICTURES = tuple(sorted(known.values(), key=lambda each: (each.of, each.place)))
 
 def names_for(dataset: xr.Dataset) -> list[str]:
     """The names of the figures that ``figures_of`` draws."""
+    dataset = as_in_scene(dataset)
     return [p.name for p in PICTURES if _recorded(dataset, p) and p.applies(dataset)]
 
 
 def figures_of(dataset: xr.Dataset, name: str | None = None) -> Iterator[tuple[Picture, Figure]]:
     """Every figure for which a run, or the samples of a merged campaign, recorded something; or the
     one of that name.
+
+    InputError if not all planes, sections and others of its scene are there.
     """
-    dataset, read = style.legible(dataset), dict[object, object]()
+    dataset, read = style.legible(as_in_scene(dataset)), dict[object, object]()
     for each in PICTURES:
         if name not in (None, each.name):
             continue

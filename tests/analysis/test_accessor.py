@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import subprocess
 import sys
@@ -11,11 +12,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from made_campaign import SECTIONS, made_campaign
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from scipy.stats import binomtest
 
 import ringsim
 from made import drawn_campaign
-from ringsim.analysis import study_text
+from ringsim.analysis import derived, study_text
 from ringsim.analysis.courses import course, courses
 from ringsim.plots import figures
 from ringsim.plots.figures import names_for
@@ -204,3 +207,103 @@ def test_a_stored_analysis_has_the_tables_of_a_new_one(tmp_path: Path) -> None:
             again = {"run it again"} & set(rows)  # in the folder of the file
             assert rows.drop(columns=again).equals(found[name].drop(columns=again))
             assert rows.attrs == found[name].attrs
+
+
+@pytest.fixture(scope="module")
+def cases() -> xr.Dataset:
+    """Single changes, of which samples 1 and 4 have the largest numbers."""
+    found = made_campaign(6, kind="one-at-a-time").assign_attrs(design='{"kind": "one-at-a-time"}')
+    young, friction = found["rods_young_modulus"], found["cables_upper_friction_coefficient"]
+    young[:] = [1e11, 2e11, 3e11, 1e11, 1e11, 1e11]
+    friction[:] = np.ones((6, 3)) + np.array([0, 0, 0, 1, 2, 3])[:, None]
+    found["cables_lower_winch_stop_time"][:] = "none"
+    return found
+
+
+def marks(figure: Figure) -> list[object]:
+    """Places and heights of all marks, and the names below."""
+    drawn = [np.asarray(c.get_offsets()).tolist() for ax in figure.axes for c in ax.collections]
+    return [drawn, [text.get_text() for text in figure.axes[-1].get_xticklabels()]]
+
+
+@pytest.mark.parametrize("order", [[0, 3, 1, 2, 4, 5], [5, 4, 3, 2, 1, 0]])
+def test_samples_may_come_in_any_order(order: list[int], cases: xr.Dataset) -> None:
+    other = cases.isel(sample=order)
+    assert marks(other.ring.plot("one_by_one")) == marks(cases.ring.plot("one_by_one"))
+    found, expected = other.ring.tables(), cases.ring.tables()
+    assert list(found) == list(expected)
+    for name, rows in expected.items():
+        assert found[name].equals(rows)
+    assert other.ring.worst().equals(cases.ring.worst())
+    xr.testing.assert_equal(other.ring.fan(), cases.ring.fan())
+    assert ringsim.analyse(other).equals(ringsim.analyse(cases))
+
+
+def test_without_its_sample_nothing_is_the_base_case(cases: xr.Dataset) -> None:
+    part = cases.isel(sample=slice(2, None))
+    assert "one_by_one" not in part.ring.plot()
+    for each, there in ((part, False), (cases, True)):
+        every = [*each.ring.tables().values(), *each.ring.dossier().values(), each.ring.worst()]
+        text = " ".join(rows.to_string() for rows in every)
+        assert ("the base case" in text) == there
+        assert ("(base: " in text) == there
+
+
+@pytest.mark.parametrize(
+    ("selected", "told"),
+    [
+        ({"sample": []}, "no sample is left"),
+        ({"section": slice(0, 2)}, "section is only 1, 2 in this selection, and must be each"),
+        ({"section": 0}, "section is only 1 in"),
+        ({"plane": 0}, "plane is only upper in"),
+        ({"plane": [1]}, "plane is only lower in"),
+        ({"span": slice(2, 5)}, "span is only 3, 4, 5 in"),
+        ({"time": 3}, "time is only 1.5 in .*must be a dimension"),
+    ],
+)
+def test_selections_are_refused_that_lack_a_part_of_the_ring(
+    selected: dict[str, object], told: str, campaign: xr.Dataset
+) -> None:
+    part = campaign.isel(selected)
+    for ask in ("leader", "tables", "dossier", "worst", "fan", "plot"):
+        with pytest.raises(InputError, match=told):
+            getattr(part.ring, ask)()
+    if "sample" not in selected:
+        for ask in ("leader", "plot"):
+            with pytest.raises(InputError, match=told):
+                getattr(part.isel(sample=0, drop=True).ring, ask)()
+
+
+def test_planes_and_sections_may_be_turned(campaign: xr.Dataset) -> None:
+    turned = campaign.isel(section=slice(None, None, -1), plane=[1, 0])
+    xr.testing.assert_equal(turned.ring.fan(), campaign.ring.fan())
+    xr.testing.assert_equal(turned.ring.leader(), campaign.ring.leader())
+    run, other = (each.isel(sample=3, drop=True) for each in (campaign, turned))
+    drawn = [
+        [(line.get_label(), np.asarray(line.get_ydata()).tolist()) for line in axes.lines]
+        for each in (run, other) for axes in each.ring.plot("nodal_forces").axes
+    ]  # fmt: skip
+    half = len(drawn) // 2
+    assert drawn[:half] == drawn[half:]
+    assert any(drawn)
+
+
+def test_each_of_two_campaigns_has_outputs_of_its_own() -> None:
+    """One has apart in s and up to 1.9, the other in degree without a bound."""
+    made = []
+    for of, unit in (("max(lock_time)", "s"), ("max(opening_angle)", "degree")):
+        one = made_campaign(4)
+        one["apart"] = "sample", np.linspace(0.5, 2.0, 4), {"units": unit}
+        required = {"apart": {"max": 1.9, "probability": 0.5, "confidence": 0.9}}
+        one.attrs |= {"outputs": json.dumps({"apart": {"of": of}}),
+                      "requirements": json.dumps(required)}  # fmt: skip
+        made.append(one)
+    try:
+        first, second = (each.ring for each in made)
+        for each, unit in ((first, "s"), (second, "deg"), (first, "s")):
+            told = each.worst()["found"].tolist()
+            assert f"2 {unit}" in told
+            drawn = " ".join(text.get_text() for text in each.plot("distributions").findobj(Text))
+            assert f"max 1.9 {unit}" in drawn
+    finally:
+        derived.forget(derived.declared())

@@ -186,6 +186,27 @@ def test_paraview(run_file: Path) -> None:
                 assert sorted(mesh.cell_data["stress"][0][ends]) == rows.tolist()
 
 
+def test_paraview_of_a_turned_run_and_of_a_part_of_one(run_file: Path, tmp_path: Path) -> None:
+    """Each joint has its own lag, in whatever order a file has them."""
+    whole = xr.load_dataset(run_file)
+    turned = whole.isel(section=slice(None, None, -1), plane=[1, 0])
+    for name, each in (("turned", turned), ("cut", whole.isel(section=[1])),
+                       ("instant", whole.isel(time=5))):  # fmt: skip
+        save(each, tmp_path / f"{name}.nc")
+    export(run_file, "--format", "pvd")
+    export(tmp_path / "turned.nc", "--format", "pvd")
+    both = grids(run_file.with_suffix(".pvd")), grids(tmp_path / "turned.pvd")
+    for time, mesh in both[0].items():
+        other = both[1][time]
+        np.testing.assert_array_equal(mesh.points, other.points)
+        np.testing.assert_array_equal(mesh.point_data["lag"], other.point_data["lag"])
+    for name, told in (("cut", "section is only 2 in"), ("instant", "time is only 2.5 in")):
+        assert told in export(tmp_path / f"{name}.nc", "--format", "pvd", code=2)
+    export(tmp_path / "instant.nc", "--format", "csv")
+    numbers = pd.read_csv(tmp_path / "instant-plane-section.csv")
+    assert len(numbers) == 2 * SECTIONS
+
+
 def test_paraview_of_samples(file: Path, campaign: xr.Dataset) -> None:
     """Without positions they follow from the angles, which is told."""
     save(campaign.drop_vars("position").drop_dims(["point", "axis"]), file)
