@@ -42,13 +42,15 @@ _MEASURED = click.option(
 def opened(path: Path) -> xr.Dataset:
     """The dataset in a file, or of the campaign in a folder, as ``open_stored`` opens it.
 
-    Results of an interrupted campaign are merged first, which a line says.  While a campaign runs
-    there nothing is: its end merges them.  InputError if there is none.
+    Results of an interrupted campaign are merged first, which a line says, also where its file is
+    named.  While a campaign runs there nothing is: its end merges them.  InputError if there is
+    none.
     """
-    if any(path.glob("journals/*")) and is_behind(path) and not runs_in(path):
-        left, _, _ = merge(open_folder(path), execution="", partly=True)
+    folder = path.parent if path.name == MERGED and path.is_file() else path
+    if any(folder.glob("journals/*")) and is_behind(folder) and not runs_in(folder):
+        left, _, _ = merge(open_folder(folder), execution="", partly=True)
         told = f", {counted(left, 'sample')} not run" if left else ""
-        click.echo(f"{path}: merged its results into {MERGED}{told}")
+        click.echo(f"{folder}: merged its results into {MERGED}{told}")
     if path.is_dir() and not (path / MERGED).exists() and runs_in(path):
         raise InputError(
             f"{path}: this campaign is running, and merges its results at its end: wait for "

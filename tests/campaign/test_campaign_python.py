@@ -155,6 +155,10 @@ def test_verbs_merge_what_was_interrupted_but_not_what_runs(
         assert done.exit_code == 0, done.output
         assert done.output.splitlines().count(line) == 1
     assert line not in CliRunner().invoke(cli, ["analyse", str(folder)]).output
+    # Its file that is behind is no older result, named by itself.
+    os.utime(folder / "campaign.nc", (0.0, 0.0))
+    assert line in CliRunner().invoke(cli, ["analyse", str(folder / "campaign.nc")]).output
+    assert line not in CliRunner().invoke(cli, ["analyse", str(folder / "campaign.nc")]).output
 
 
 def test_too_many_failures_are_an_error_and_some_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
