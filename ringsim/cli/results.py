@@ -32,6 +32,7 @@ from ringsim.files import MERGED, require_file, require_place, writing
 from ringsim.refusal import EXIT_DONE, EXIT_NOT_MET, InputError, known_or_nearest
 from ringsim.storage.netcdf import runs_in
 from ringsim.tables import counted, size_text, slim
+from ringsim.variables import Status
 
 _MEASURED = click.option(
     "--measured", metavar="TOML", type=PATH,
@@ -373,15 +374,31 @@ def _shown(dataset: xr.Dataset, sample: int | None, file: Path) -> tuple[xr.Data
         return dataset, file.stem
     if sample is None:
         chosen = median_and_worst(dataset)
-        sample = int(dataset["sample"][0]) if chosen is None else chosen[1]
+        first = dataset["sample"].values[int(ran(dataset).argmax())]
+        sample = int(first) if chosen is None else chosen[1]
     _require_sample(dataset, sample, file)
+    _require_run(dataset, sample, file)
     return dataset.sel(sample=sample), f"{file.stem}-sample{sample}"
 
 
 def _require_sample(dataset: xr.Dataset, sample: int, file: Path) -> None:
-    if sample not in dataset["sample"]:
+    held = dataset["sample"].values.tolist()
+    if sample not in held:
+        told = f"{held[0]} to {held[-1]}"
+        if held != list(range(held[0], held[-1] + 1)):
+            told = ", ".join(map(str, held[:_NAMED])) + ", ..." * (len(held) > _NAMED)
+        raise InputError(f"--sample {sample}: {file} has samples {told}: choose one of them")
+
+
+_NAMED = 20
+"""Samples that a message names at most."""
+
+
+def _require_run(dataset: xr.Dataset, sample: int, file: Path) -> None:
+    if dataset["status"].sel(sample=sample) < Status.OK:
         raise InputError(
-            f"--sample {sample}: {file} has samples 0 to {dataset.sizes['sample'] - 1}"
+            f"--sample {sample}: it has not run, so that {file} has nothing to show of it: run "
+            "the campaign's file again, which runs what is left, or choose another sample"
         )
 
 
@@ -498,6 +515,8 @@ def export_command(
         samples = tuple(dict.fromkeys(samples))  # each once, however often it is named
         for sample in samples:
             _require_sample(dataset, sample, file)
+            if "pvd" in formats:
+                _require_run(dataset, sample, file)
         if campaign and "pvd" in formats and not samples:
             raise InputError(
                 "--format pvd: is for single runs, and this is a campaign: choose samples with "

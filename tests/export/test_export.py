@@ -20,6 +20,7 @@ from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.shapes import COMPUTED, FROM_ANGLES, shape_of
 from ringsim.tables import size_text
+from ringsim.variables import Status
 
 
 def export(*words: object, code: int = 0) -> str:
@@ -220,12 +221,19 @@ def test_what_cannot_be_exported_is_refused(
     file: Path, run_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     xr.Dataset({"verdict": 1.0}).to_netcdf(file.with_name("analysis.nc"))
+    few = file.with_name("few.nc")  # sample 1 failed at once
+    part = xr.load_dataset(file).isel(sample=[3, 1])
+    part["opening_angle"][1], part["position"][1] = np.nan, np.nan
+    part["status"][1] = int(Status.DIVERGED)
+    save(part, few)
     refusals = [
         ((file, "--format", "xls"), "--format xls: 'xls' is not an export format (known: csv"),
         ((file, "--format", "pvd"), "is for single runs, and this is a campaign: choose"),
         ((file, "--sample", 9), "--sample 9: "),
         ((run_file, "--sample", 0), "has only one run: leave it out"),
-        ((file, "--format", "pvd", "--sample", 3), "ended before its first record: there is noth"),
+        ((file, "--format", "pvd", "--sample", 3), "--sample 3: it has not run, so that"),
+        ((few, "--sample", 0), f"{few} has samples 1, 3: choose one of them"),
+        ((few, "--format", "pvd", "--sample", 1), "ended before its first record: there is noth"),
         ((file.with_name("analysis.nc"),), "has neither a run nor a campaign"),
         ((file.with_name("gone.nc"),), "there is no such file"),
     ]  # fmt: skip

@@ -120,7 +120,7 @@ def test_what_it_cannot_show_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
         (("plot", "many.nc", "--sample", 1), "has no effect without --animate"),
         (("plot", "many.nc", "--animate", "--sample", 7), "has samples 0 to 2"),
         (("plot", "many.nc", "--animate", "--measured", "a.toml"), "not together with --measured"),
-        (("plot", "many.nc", "--animate", "--sample", 2), "ended before its first record"),
+        (("plot", "many.nc", "--animate", "--sample", 2), "--sample 2: it has not run"),
         (("plot", "many.nc", "--animate", "--colour", "stress"), "record.stress=true"),
         (("run", "truss2", "--animate", "--colour", "stress"), "give --set record.stress=true"),
     ):
