@@ -58,6 +58,8 @@ _STRAY = 0.01
 """Probability with which a test without faults has a stray reading."""
 _OF_SENSOR, _OF_ALL = 0.25, 0.1
 """Shares of a sensor's readings, and of those of all, up to which strays are believed."""
+_TOO_MANY = "more than a tenth of all readings"
+"""Why readings are kept of which more than ``_OF_ALL`` are off."""
 _IN_A_ROW = 2
 """Strays that may always follow each other: what a model lacks takes longer."""
 _UNLIKELY = 0.05
@@ -219,6 +221,9 @@ def learn(points: Array, told: Sequence[Told]) -> Learnt:
         worst = [k for k, size in enumerate(sizes) if (size > limit).any()]
         for k in worst:
             kept[k][np.flatnonzero(kept[k])[sizes[k] > limit]] = False
+        if not any(mask.any() for mask in kept):  # no others that any of them could be stray beside
+            kept, held = [np.ones_like(mask) for mask in kept], [_TOO_MANY]
+            break
         if worst:
             continue
         aside = [_set_aside(found, points, *each) for each in zip(told, kept, strict=True)]
@@ -314,7 +319,7 @@ def _no_strays(kept: Sequence[Mask], told: Sequence[Told]) -> dict[str, list[_Re
         chance = scipy.stats.binom.sf(len(those) - 1, there, share(len(those), there))
         if len(those) > 1 and max(map(len, kept)) * chance < UNEXPLAINED:
             found[f"{len(those)} sensors together at {time:.6g} by the clock"] = those
-    return found or ({"more than a tenth of all readings": off} if strays > _OF_ALL * every else {})
+    return found or ({_TOO_MANY: off} if strays > _OF_ALL * every else {})
 
 
 def _rows(strays: Mask) -> list[tuple[int, int]]:

@@ -158,6 +158,21 @@ def test_two_strays_of_a_short_sensor_are_set_aside_and_three_in_a_row_are_not()
     assert told_wrong(every)
 
 
+@pytest.mark.parametrize("count", [1, 2, 50])
+def test_readings_that_are_all_far_off_are_kept_and_not_explained(count):
+    """Nothing that moves the unknown gives any of them: each is off by 100 sigma and more."""
+    stream = np.random.default_rng(3)
+    points = stream.standard_normal((100, 1))
+    data = 100.0 * (-1.0) ** np.arange(count) * (1.0 + stream.random(count))
+    slope = 1e-3 * np.ones((count, 1))
+    found = learn(points, [Told("s", points @ slope.T, data, 1.0)])
+    [fit] = found.fits
+    assert (fit.readings, fit.strays) == (count, [])
+    assert fit.rms == pytest.approx(np.sqrt(np.mean(data**2)), rel=1e-3)
+    assert found.held == ["more than a tenth of all readings"]
+    assert told_wrong(found)
+
+
 def leverage_of_the_first(seed, size=0.0):
     """Two sensors; the first reading of the second one alone tells the last unknown."""
     slope, stream = slopes(seed), np.random.default_rng([seed, 31])
