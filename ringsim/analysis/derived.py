@@ -279,6 +279,16 @@ def over_samples(
     return found
 
 
+def of_run(
+    outputs: Mapping[str, Derived], arrays: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """Arrays of stored variables and coordinates of one run, and the values of all outputs beside
+    them, shape ().
+    """
+    found = over_samples(outputs, {name: v[None] for name, v in arrays.items()}, arrays)
+    return {**arrays, **{name: values.reshape(()) for name, values in found.items()}}
+
+
 # What an expression may be made of: the same walk tells dimensions and unit, and computes.
 
 

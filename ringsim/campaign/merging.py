@@ -210,13 +210,9 @@ def _add_checks(
         blocks = {n: netcdf.blank(variable, (len(part),)) for n, variable in both.items()}
         for result in checks.results(np.arange(part.start, part.stop)):
             known = {"status": result.status, "cause": result.cause, "reason": result.reason}
-            arrays = result.arrays()
-            each = {n: v[None] for n, v in arrays.items()}
-            arrays |= derived.over_samples(own, each, arrays)
-            for name, value in {**arrays, **known}.items():
+            for name, value in {**derived.of_run(own, result.arrays()), **known}.items():
                 if name in both:
-                    place = sample_of(result.sample) - part.start
-                    blocks[name][place] = np.asarray(value).reshape(())[()]
+                    blocks[name][sample_of(result.sample) - part.start] = np.asarray(value)[()]
         for name, values in blocks.items():
             file[f"{name}{CHECKED}"][part.start : part.stop] = values
 

@@ -110,9 +110,7 @@ class _Judge:
         more = {name: np.full(count - before, np.nan) for name in self._names}
         for result in found.results(np.arange(before, count)):
             reasons[result.sample - before] = result.reason
-            arrays = result.arrays()
-            each = {n: v[None] for n, v in arrays.items()}
-            arrays |= derived.over_samples(self._derived, each, arrays)
+            arrays = derived.of_run(self._derived, result.arrays())
             for name in self._names:
                 if name in arrays:
                     more[name][result.sample - before] = arrays[name]

@@ -455,6 +455,29 @@ def test_that_records_miss_what_is_between_them_is_told_where_such_outputs_stand
     assert not any("of records" in line for line in verdict_lines(plain))
 
 
+@pytest.mark.quick
+def test_a_campaign_may_end_by_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the first look, by hand: all of its samples keep to the bound; and the folder is read."""
+    monkeypatch.chdir(tmp_path)
+    outputs = 'pull = "max(cable_tension)"'
+    more = "[requirements]\npull = { max = 1e3, probability = 0.5, confidence = 0.5 }"
+    rule = 'stop_when = [{ requirement = "pull" }, { of = "pull", half_width = 1e3 }]'
+    text = FILE.format(outputs=outputs, more=more).replace(
+        "samples = 3 }", f"samples = 40 }}\n{rule}"
+    )
+    text = text.replace('"solver.end_time" = 0.5', '"solver.end_time" = 0.1')
+    Path("own.toml").write_text(f"{text}\n[looks]\nfirst = 8\n", encoding="utf-8")
+    for verb in ("campaign", "merge", "status"):
+        words = ["own.toml", "--workers=0"] if verb == "campaign" else ["runs/own"]
+        done = CliRunner().invoke(cli, [verb, *words])
+        assert done.exit_code == EXIT_DONE, done.output
+    found = xr.load_dataset("runs/own/campaign.nc")
+    assert found.sizes["sample"] == found.attrs["stopped_after"] == 8
+    np.testing.assert_array_equal(
+        found["pull"], found["cable_tension"].max(["plane", "span", "time"])
+    )
+
+
 def test_what_expressions_read_may_be_left_out_of_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
