@@ -270,6 +270,7 @@ class _Course:
                 self.folder, name, scene, unknowns.cases(points),
                 title=f"{asked.title or asked.name}: {title}", limits=asked.limits,
                 fidelity=asked.fidelity, clocks=_clocks(given, middle if number else {}),
+                outputs=asked.outputs,
             )  # fmt: skip
         except InputError as error:
             cure = "truncate the prior that gives it"

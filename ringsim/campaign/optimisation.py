@@ -13,6 +13,7 @@ import xarray as xr
 from pydantic import ValidationError
 
 from ringsim import build, extensions
+from ringsim.analysis import derived
 from ringsim.analysis.design import endings_of, placement
 from ringsim.analysis.engines import differences
 from ringsim.analysis.front import Axis, gains, outputs_of, write_front
@@ -333,15 +334,14 @@ class _Course:
                 self.found = end.value
                 if not self.found.checks:
                     raise InputError(self._hopeless()) from None
-        number, most = len(self.ordered) + 1, self.given.budget.designs
         if self.found is None:
             assert self.wanted is not None
-            name = f"{number:03d}-{self.wanted.samples}"
+            name = f"{len(self.ordered) + 1:03d}-{self.wanted.samples}"
             folder, more = self.folder / _DESIGNS / name, True
             self.tried += self.wanted.samples == SEARCH
             told = "check of the best design"
             if self.wanted.samples == SEARCH:
-                told = f"design {self.tried} of at most {most}"
+                told = f"design {self.tried} of at most {self.given.budget.designs}"
                 if self.wanted.without is not None:
                     which, k = self.wanted.without
                     name_of = [*self.given.budget.variables]
@@ -408,13 +408,13 @@ class _Course:
         count = campaign.table.samples
         names = list(dict.fromkeys([*self.given.budget.objectives, *self.given.budget.constraints]))
         kept = {name: np.full(count, np.nan) for name in names}
-        survey = campaign.survey()
+        survey, own = campaign.survey(), derived.known_from(campaign.attributes)
         for result in survey.results(np.arange(count)):
             wanted = self.given.budget.constraints.get(OUTCOME)
             goals = GOALS if wanted is None else (Fate[str(wanted.is_).upper()],)
             if result.status != Status.OK or result.fate not in (*goals, Fate.NONE):
                 continue
-            arrays = result.arrays()
+            arrays = derived.of_run(own, result.arrays())
             for name in names:
                 kept[name][result.sample] = 0.0 if name == OUTCOME else arrays.get(name, np.nan)
         return kept

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import tomli_w
 
+from ringsim.analysis import derived
 from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.engines import check_lines, too_far
 from ringsim.analysis.tails import subset_simulation
@@ -557,9 +558,10 @@ def run_cases(
 def listed_cases(
     folder: Path, name: str, scene: Scene, cases: Sequence[Mapping[str, Any]], *, title: str,
     limits: Allowance, fidelity: str, clocks: Mapping[str, Any] = MappingProxyType({}),
+    outputs: Mapping[str, derived.Derived] = MappingProxyType({}),
 ) -> Campaign:  # fmt: skip
     """The campaign of these cases, prepared in ``folder``/``name``; see :func:`run_cases`, and for
-    the ``clocks`` of tests ``Campaign``.
+    the ``clocks`` of tests ``Campaign``; with ``outputs`` of one's own by name.
     """
     paths, listed = list(cases[0]), io.StringIO()
     writer = csv.DictWriter(listed, paths, lineterminator="\n")
@@ -576,6 +578,7 @@ def listed_cases(
         "name": name, "title": title, "scene": base, "fidelity": fidelity,
         "design": {"kind": "list", "file": rows},
         "limits": limits.model_dump(exclude_defaults=True),
+        "outputs": {n: each.model_dump(exclude_none=True) for n, each in outputs.items()},
     }  # fmt: skip
     texts = {base: scene.to_toml(), rows: listed.getvalue(), file: tomli_w.dumps(table)}
     with writing(folder):

@@ -21,6 +21,7 @@ from loops import for_each
 import ringsim
 import ringsim.campaign.calibration as calibration
 from ringsim import simulation
+from ringsim.analysis import derived
 from ringsim.analysis.posterior import calibration_tables
 from ringsim.analysis.residuals import clock_line, residual_statistics, residuals
 from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
@@ -310,6 +311,27 @@ def test_clock_of_the_stand_is_found_too(tmp_path):
     text = stand_file.read_text().replace('"t" }', '"t", offset = 0.31 }')
     stand_file.write_text(text)
     assert not clock_line(drawn, load_measured(stand_file))
+
+
+def test_sensors_may_read_outputs_by_expressions(test_files, tmp_path):
+    """The angle of a joint at one time, which the truth had; in the stages by hand."""
+    run = simulate(scene().with_values(TRUTH | {"record.interval": 0.01}), fidelity="frame")
+    value = float(run["opening_angle"].sel(plane="upper", section=1, time=1.0))
+    (tmp_path / "stand.toml").write_text(
+        'name = "own"\n[[sensors]]\nvariable = "open"\nunit = "deg"\nstandard_deviation = 0.1\n'
+        f"value = {value}\n"
+    )
+    own = "[outputs]\nopen = \"opening_angle(plane='upper', section=1, time=1.0)\""
+    file = write_file(
+        tmp_path, 32, 2, own, {"structure.opening_angle": PRIORS["structure.opening_angle"]}
+    )
+    posterior = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / "out")
+    assert posterior["sensor"].values.tolist() == ["open"]
+    last = xr.load_dataset(tmp_path / "out" / "stage-2" / "campaign.nc")
+    angle = last["opening_angle"].sel(plane="upper", section=1)
+    np.testing.assert_allclose(last["open"], angle.interp(time=1.0))
+    assert float(posterior["learnt"][0]) < 0.2
+    derived.forget(derived.declared())
 
 
 @pytest.mark.slow

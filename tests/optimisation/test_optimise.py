@@ -20,6 +20,7 @@ from click.testing import CliRunner
 import ringsim
 from ringsim.analysis import derived
 from ringsim.analysis.front import front_tables
+from ringsim.campaign import optimisation
 from ringsim.campaign.optimisation import FRONT, fresh_verdict, optimisation_of
 from ringsim.cli import cli
 from ringsim.overrides import with_number
@@ -430,6 +431,24 @@ def test_budget_can_be_set_in_the_call(file):
     given = optimisation_of(FILE, file, {"designs": 20, "verdict": 50, "solver.step": 0.02})
     assert (given.budget.designs, given.budget.verdict) == (20, 50)
     assert given.present.scene.solver.step == 0.02
+
+
+def test_a_search_goes_by_outputs_by_expressions(found, file, tmp_path):
+    """The peak of what is recorded, on each of the first designs, by hand."""
+    own = '[outputs]\npull = "max(cable_tension)"\nlate = "max(lock_time)"\n'
+    text = FILE.replace("peak_tension = {", "pull = {").replace("deployment_time = {", "late = {")
+    given = optimisation_of(f"{text}\n{own}", file)
+    course = optimisation._Course(given, tmp_path)
+    order = course.order()
+    shutil.copytree(found[1] / "designs" / "001-search", order.folder)  # the same samples
+    order.prepare()
+    values = course._values(order.folder)
+    with ringsim.open_campaign(order.folder) as ran:
+        pull = ran["cable_tension"].max(["plane", "span", "time"]).values
+        np.testing.assert_array_equal(values["pull"], pull)
+        np.testing.assert_array_equal(values["late"], ran["lock_time"].max(["plane", "section"]))
+    assert np.isfinite(pull).all()
+    derived.forget(derived.declared())
 
 
 def test_outputs_by_expressions_are_objectives_and_constraints():
