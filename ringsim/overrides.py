@@ -4,6 +4,7 @@ import difflib
 import operator
 import re
 import tomllib
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ringsim.cable.records import CABLES, number_of, path_of, spans_of
@@ -53,6 +54,20 @@ def parse_value(text: str, where: str) -> Any:
             ) from None
         return text
     return table["value"] if len(table) == 1 else text
+
+
+def in_turn(*tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by path of several tables, so that what is set again counts where it is set last: a
+    whole list would overwrite its places that stand before it.
+
+    >>> in_turn({"lug": 0.1, "pin[2]": 0.6}, {"pin": 0.5}, {"pin[2]": 0.7})
+    {'lug': 0.1, 'pin': 0.5, 'pin[2]': 0.7}
+    """
+    found = dict[str, Any]()
+    for path, value in (item for table in tables for item in table.items()):
+        found.pop(path, None)
+        found[path] = value
+    return found
 
 
 def section_of(path: str) -> tuple[str, int | str | None]:

@@ -46,7 +46,7 @@ from ringsim.campaign.specification import (
 from ringsim.files import parse_toml, read_text, write_text, writing
 from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, holds, supply
-from ringsim.overrides import field_at, flat, with_number
+from ringsim.overrides import field_at, flat, in_turn, with_number
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain, known_or_nearest, show
 from ringsim.sampling.table import first_inside, refuse_fixed
 from ringsim.scene import Scene
@@ -121,10 +121,10 @@ class Given:
 
     def campaign(self, wanted: Wanted, name: str) -> Campaign:
         """The campaign that runs a design."""
+        settings = in_turn(self.settings, self.settings_of(wanted.point))
         return _campaign(
-            self.path, self.table, {**self.settings, **self.settings_of(wanted.point)}, self.scene,
-            self.budget, wanted.samples, name,
-        )  # fmt: skip
+            self.path, self.table, settings, self.scene, self.budget, wanted.samples, name
+        )
 
 
 def _campaign(

@@ -28,7 +28,7 @@ from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
 from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, axes, holds, supply
-from ringsim.overrides import flat, with_number
+from ringsim.overrides import flat, in_turn, with_number
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Correlation, Table
 from ringsim.sampling.designs import Design
@@ -518,7 +518,8 @@ def campaign_of(
         specification = Specification.model_validate(table)
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
-    specification.set.update(settings or {})
+    together = in_turn(specification.set, settings or {})
+    specification = specification.model_copy(update={"set": together})
     for name, value in (settings or {}).items():
         own_key = re.split(r"[.\[]", name)[0].strip("\"'")
         if own_key in Specification.model_fields.keys() - Scene.model_fields.keys():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from ringsim.overrides import parse_assignment
+from ringsim.overrides import in_turn, parse_assignment
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.scene import builtin_scenes
 
@@ -21,7 +21,7 @@ WORKERS = click.IntRange(1, 4096)
 
 
 def _assigned(_context: Any, _option: Any, texts: tuple[str, ...]) -> dict[str, Any]:
-    return dict(parse_assignment(text) for text in texts)
+    return in_turn(*(dict([parse_assignment(text)]) for text in texts))
 
 
 def _formats(_context: Any, _option: Any, text: str | None) -> Formats:

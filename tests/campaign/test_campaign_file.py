@@ -41,6 +41,14 @@ def loaded(folder, text=GOOD):
     return load_campaign(path)
 
 
+def test_what_the_call_sets_again_counts_where_it_is_set_last(tmp_path):
+    text = GOOD.replace("[set]", '[set]\n"rods.young_modulus[2]" = 1e11\n', 1)
+    (tmp_path / "good.toml").write_text(text)
+    settings = {"rods.young_modulus": 2e11, "rods.young_modulus[2]": 3e11}
+    told = load_campaign(tmp_path / "good.toml", settings).scene.rods.young_modulus
+    assert told[:3] == (2e11, 3e11, 2e11)
+
+
 def test_paths_may_be_quoted_or_nested(tmp_path):
     campaign = loaded(tmp_path)
     assert campaign.scene.structure.sections == 6

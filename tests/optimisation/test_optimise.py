@@ -20,6 +20,7 @@ from click.testing import CliRunner
 import ringsim
 from ringsim.analysis import derived
 from ringsim.analysis.front import front_tables
+from ringsim.analysis.optimum import SEARCH, Wanted
 from ringsim.campaign import optimisation
 from ringsim.campaign.optimisation import FRONT, fresh_verdict, optimisation_of
 from ringsim.cli import cli
@@ -425,6 +426,24 @@ def test_friction_of_chosen_pulleys_may_be_a_variable(file):
     assert (told[place - 1], told[1]) == (1e-4, 1e-3)
     others = [told[k] for k in range(len(told)) if k not in (place - 1, 1)]
     assert others == [scene.cables.lower.friction.coefficient] * len(others)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_variable_comes_after_what_the_call_sets_of_the_whole(first, file):
+    """Of a place that the file sets, too: its value in the design counts, and others the call's."""
+    place = "joints.vjoint.viscous[2]"
+    text = FILE.replace("designs = 10", "designs = 12")
+    text = text.replace("[set]", f'[set]\n"{place}" = 0.6')
+    text = text.replace(
+        "[objectives]", f"[variables.'{place}']\nlow = 0.3\nhigh = 1.0\n[objectives]"
+    )
+    settings = {"joints.vjoint.viscous": 0.5}
+    settings = settings | {place: 0.7} if first else {place: 0.7} | settings
+    given = optimisation_of(text, file, settings)
+    assert given.values(given.start)[place] == (0.7 if first else 0.5)
+    for share, value in ((0.0, 0.3), (1.0, 1.0)):
+        scene = given.campaign(Wanted(SEARCH, np.array([0.5, share])), "x").scene
+        assert scene.joints.vjoint.viscous == (0.5, value, 0.5)
 
 
 def test_budget_can_be_set_in_the_call(file):
