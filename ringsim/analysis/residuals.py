@@ -377,9 +377,10 @@ class Ranking(NamedTuple):
     """The same with each sensor alone, in their own order."""
 
 
-def rank(points: Array, told: Sequence[Told]) -> Ranking:
+def rank(points: Array, told: Sequence[Told], lower: Array) -> Ranking:
     """Sensors in the order in which they leave least of the scatter of unknowns (geometric mean).
 
+    Unknowns u = L w are correlated by the root L = ``lower``, of which ``points`` are the w.
     What has been read does not matter: of a linear map the covariance is the same for any data.
     """
     reduced = []
@@ -392,7 +393,7 @@ def rank(points: Array, told: Sequence[Told]) -> Ranking:
     def scatter(chosen: Sequence[int]) -> Array:
         outputs = np.concatenate([reduced[k] for k in chosen], axis=1)
         covariance = posterior_of(points, outputs, np.zeros(outputs.shape[1])).covariance
-        return np.asarray(np.sqrt(np.diag(covariance)))
+        return np.asarray(np.sqrt(np.diag(lower @ covariance @ lower.T)))
 
     every, order, after = range(len(told)), list[int](), list[Array]()
     alone = np.array([scatter([k]) for k in every])

@@ -507,10 +507,10 @@ def _clocks(given: Given, medians: Mapping[str, float]) -> dict[str, dict[str, l
 
 def _write_sensors(course: _Course) -> None:
     """The file of a plan of sensors, the one that tells most first."""
-    names = Unknowns.of(course.given).names
+    unknowns = Unknowns.of(course.given)
     told = [each for each in course.told if len(each.measured)]
     silent = [each.sensor for each in course.told if not len(each.measured)]
-    found = rank(course.points[-1], told)
+    found = rank(course.points[-1], told, unknowns.lower)
     rows = xr.Dataset(
         {
             "learnt": (("sensor", "unknown"), found.after, {
@@ -519,7 +519,7 @@ def _write_sensors(course: _Course) -> None:
             "alone": (("sensor", "unknown"), found.alone[found.order], {
                 "long_name": "the same with this sensor alone", "units": "1"}),
         },
-        {"sensor": [told[k].sensor for k in found.order], "unknown": names},
+        {"sensor": [told[k].sensor for k in found.order], "unknown": unknowns.names},
         {"scene": course.given.campaign.scene.to_toml(), "silent": ", ".join(silent),
          **build.provenance()},
     )  # fmt: skip

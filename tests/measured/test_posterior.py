@@ -421,7 +421,7 @@ def test_sensors_come_in_the_order_of_what_they_leave():
     """Against every pair and every single one by the closed form."""
     slope, count = 4.0 * slopes(9, unknowns=3, readings=60), 6
     points = 0.01 * np.random.default_rng(10).standard_normal((400, 3)) + 0.5  # a late stage
-    found = rank(points, sensors(points @ slope.T, np.zeros(60), count))
+    found = rank(points, sensors(points @ slope.T, np.zeros(60), count), np.eye(3))
 
     def left(chosen):
         own = np.concatenate([np.arange(10 * k, 10 * k + 10) for k in chosen])
@@ -434,6 +434,24 @@ def test_sensors_come_in_the_order_of_what_they_leave():
     assert found.order[1] == min(second, key=second.get)
     for k in range(count):
         np.testing.assert_allclose(found.after[k], left(found.order[: k + 1]), rtol=1e-6)
+
+
+def test_sensors_of_correlated_unknowns_leave_what_the_closed_form_says():
+    """In terms of u with the prior R: (R^-1 + A' A)^-1, of each sensor and of all."""
+    slope, count = 3.0 * slopes(9, unknowns=3, readings=60), 6
+    prior = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.3], [0.0, 0.3, 1.0]])
+    lower = np.linalg.cholesky(prior)
+    points = np.random.default_rng(10).standard_normal((400, 3))
+    found = rank(points, sensors(points @ lower.T @ slope.T, np.zeros(60), count), lower)
+
+    def left(chosen):
+        own = np.concatenate([np.arange(10 * k, 10 * k + 10) for k in chosen])
+        return np.sqrt(np.diag(np.linalg.inv(np.linalg.inv(prior) + slope[own].T @ slope[own])))
+
+    alone = np.array([left([k]) for k in range(count)])
+    np.testing.assert_allclose(found.alone, alone, rtol=1e-6)
+    assert found.order[0] == np.log(alone).sum(axis=1).argmin()
+    np.testing.assert_allclose(found.after[-1], left(range(count)), rtol=1e-6)
 
 
 def test_sensors_that_seem_to_take_knowledge_away_are_named():
