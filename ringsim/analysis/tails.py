@@ -38,6 +38,15 @@ def subset_simulation(attributes: Mapping[Any, Any]) -> SubsetSimulation | None:
     return SubsetSimulation.model_validate(table)
 
 
+def _as_grown(campaign: xr.Dataset) -> xr.Dataset:
+    """The samples in the order in which they were drawn, up to the first that is left out: which
+    ones come after it follows from its response.
+    """
+    campaign = campaign.sortby("sample")
+    there = campaign["sample"].to_numpy() == np.arange(campaign.sizes["sample"])
+    return campaign.isel(sample=slice(int(np.cumprod(there).sum())))
+
+
 def _responses(campaign: xr.Dataset, design: SubsetSimulation) -> Array:
     values = campaign[design.of].to_numpy().astype(float)
     return design.responses(values, ~good(campaign))
@@ -50,7 +59,7 @@ def approach(campaign: xr.Dataset) -> list[tuple[Array, Array]]:
     if (design := subset_simulation(campaign.attrs)) is None:
         return []
     found = []
-    for one in design.levels(_responses(campaign, design)).repetitions:
+    for one in design.levels(_responses(_as_grown(campaign), design)).repetitions:
         places, shares = [*one.thresholds], [*one.shares]
         if one.probability > 0.0:
             places, shares = [*places, design.target], [*shares, one.probability]
@@ -107,6 +116,7 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     """Variables ``tail_...`` of a campaign of subset simulation; none of other campaigns."""
     if (design := subset_simulation(campaign.attrs)) is None:
         return {}
+    campaign, given = _as_grown(campaign), campaign.sizes["sample"]
     known = _responses(campaign, design)
     found = design.levels(known)
     each = np.array([one.probability for one in found.repetitions])
@@ -146,6 +156,8 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
         "tail_lost": ((), int(lost(campaign).sum()), about(
             "failed runs, counted as outside the event")),
         "tail_ended": ((), int(found.ended), about("whether all levels have run")),
+        "tail_left_out": ((), int(len(known) < given), about(
+            "whether samples are left out that others were drawn from")),
         **_short(design, known, found.repetitions, units),
         **_checks(campaign, design, known, found.repetitions, units),
     }  # fmt: skip
@@ -304,6 +316,12 @@ def tail_table(analysis: xr.Dataset) -> Table:
     runs, lost = analysis.attrs["samples"], int(analysis["tail_lost"])
     replicates, levels = analysis.sizes["tail_replicate"], int(analysis["tail_levels"].max())
     if not int(analysis["tail_ended"]):
+        if int(analysis["tail_left_out"]):
+            notes = [
+                "samples are left out from which others were drawn: no probability; analyse the "
+                "whole campaign for it"
+            ]
+            return Table(head, [("runs", str(runs))], notes)
         notes = ["not all levels have run yet: no probability"]
         return Table(head, [("runs so far", str(runs))], notes)
     low, high = analysis["tail_probability_interval"].to_numpy()

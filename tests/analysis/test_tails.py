@@ -9,7 +9,7 @@ from scipy.stats import norm
 from made import drawn_campaign
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import sections, told
-from ringsim.analysis.tails import tail_table
+from ringsim.analysis.tails import approach, tail_table
 from ringsim.plots.campaign.tornado import explained
 from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.variables import Status
@@ -105,6 +105,29 @@ def test_an_event_that_all_reached_has_its_probability():
     assert found.tail_probability_interval.values[0] < norm.sf(2.5)
     (probability,) = [text for what, text in tail_table(found).rows if what == "probability"]
     assert float(probability) == pytest.approx(found.tail_probability.item(), rel=5e-3)
+
+
+def test_a_probability_is_that_of_the_samples_in_any_order_and_none_of_a_part():
+    made = campaign(2.5, 8)
+    right = analyse(made)
+    count = made.sizes["sample"]
+    order = np.random.default_rng(1).permutation(count)
+    for selected in (made.isel(sample=slice(None, None, -1)), made.isel(sample=order)):
+        found = analyse(selected)
+        assert found.tail_probability.item() == right.tail_probability.item()
+        np.testing.assert_array_equal(
+            found.tail_probability_interval, right.tail_probability_interval
+        )
+        assert [each[0].tolist() for each in approach(selected)] == [
+            each[0].tolist() for each in approach(made)
+        ]
+    event = np.flatnonzero(made.asynchrony_max.values > 1.0)
+    for part in (event, np.delete(np.arange(count), count // 2), np.arange(1, count)):
+        table = tail_table(analyse(made.isel(sample=part)))
+        assert dict(table.rows) == {"runs": str(len(part))}
+        assert "samples are left out from which others were drawn" in table.notes[0]
+    unfinished = tail_table(analyse(made.isel(sample=slice(0, 450))))
+    assert unfinished.notes == ["not all levels have run yet: no probability"]
 
 
 def test_samples_of_chains_are_not_judged_as_independent():
