@@ -25,7 +25,7 @@ from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import BLOCK_ROW, partners
 from ringsim.sampling.designs import Design
-from ringsim.sampling.designs.blocks import Grouped, stretches
+from ringsim.sampling.designs.blocks import Saltelli, block_size, stretches
 from ringsim.stepping.instant import Array
 from ringsim.variables import GOALS, NO_CODE, Cause, Code, Fate, Status
 
@@ -191,8 +191,8 @@ def placement(campaign: xr.Dataset) -> Placement:
         return Placement("", population=False, independent=False)
     given = table.get("replicates", getattr(kind.model_fields.get("replicates"), "default", 1))
     block = 1
-    if issubclass(kind, Grouped) and (blocks := blocks_of(campaign)) is not None:
-        block = blocks.size
+    if issubclass(kind, Saltelli) and BLOCK_ROW in campaign:
+        block = block_size(campaign[BLOCK_ROW].to_numpy(), campaign["sample"].to_numpy())
     return Placement(str(table["kind"]), kind.population, kind.independent, int(given), block)
 
 

@@ -19,7 +19,7 @@ from made import (
     response,
 )
 from ringsim.analysis import indices
-from ringsim.analysis.design import blocks_of
+from ringsim.analysis.design import blocks_of, placement
 from ringsim.analysis.indices import dependence
 from ringsim.analysis.influence_text import sensitivity_tables
 from ringsim.analysis.intervals import of_independent, spread
@@ -141,6 +141,26 @@ def test_a_first_order_index_above_the_total_one_is_told_if_their_intervals_are_
     found.first_order_index_interval[0, 0] = found.total_index_interval[0, 0] + 0.02
     (note,) = sensitivity_tables(found)[0].notes
     assert "first-order indices above total indices of asynchrony_max" in note
+
+
+@pytest.mark.quick
+def test_a_part_of_the_runs_has_the_replicates_of_the_design():
+    """The interval of a mean, by hand from the means of replicates; all rows and A and B alone."""
+    made = drawn_campaign(Saltelli(samples=64, replicates=4), ishigami, 3, 2)
+    rows, number = made["block_row"].values, made["sample"].values
+    drawn = np.isin(rows, ["A", "B"])
+    stream = np.random.default_rng(5)
+    every = {"but the last": number[:-1], "mixed": stream.permutation(number)[:250],
+             "A and B": number[drawn], "every other": number[number // 5 % 2 == 0]}  # fmt: skip
+    for name, chosen in every.items():
+        part = made.isel(sample=chosen)
+        assert placement(part).block == 5, name
+        own = chosen[drawn[chosen]]
+        values = made["asynchrony_max"].values[own]
+        means = [values[own // 5 % 4 == k].mean() for k in np.unique(own // 5 % 4)]
+        low, high = analyse(part)["asynchrony_max_interval"].sel(statistic="mean").values
+        half = scipy.stats.t.ppf(0.975, len(means) - 1) * np.std(means, ddof=1) / len(means) ** 0.5
+        assert (high - low) / 2 == pytest.approx(half, rel=0.1), name
 
 
 def test_samples_lost_at_random_cost_whole_blocks_and_are_told():

@@ -288,3 +288,17 @@ class Saltelli(Grouped, Replicated):
                     "independent groups: put both inputs into one group of design.groups"
                 )
         return super().table(factors, correlations, seed=seed, folder=folder)
+
+
+def block_size(rows: NDArray[np.str_], samples: NDArray[np.int64]) -> int:
+    """Runs of a block of a Saltelli design, of any selection of its runs and in any order; 1 if
+    they do not tell.  Shapes (n,).
+
+    Numbers of runs of one kind differ by whole blocks, A begins a block, and B ends it.
+
+    >>> block_size(np.array(["A", "AB: a", "B", "AB: a", "B"]), np.array([4, 5, 7, 13, 15]))
+    4
+    """
+    whole = [np.diff(samples[rows == row]) for row in np.unique(rows)]
+    whole += [samples[rows == "A"], samples[rows == "B"] + 1]
+    return int(np.gcd.reduce(np.concatenate(whole))) or 1
