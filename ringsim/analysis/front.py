@@ -7,9 +7,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import netCDF4
 import numpy as np
 
-from ringsim.analysis.intervals import LEAST_OF_BOOTSTRAP, quantities
+from ringsim.analysis.design import placement
+from ringsim.analysis.engines import differences
+from ringsim.analysis.intervals import (
+    CHECKED,
+    LEAST_OF_BOOTSTRAP,
+    good,
+    numbers,
+    quantities,
+    share_interval,
+)
 from ringsim.analysis.optimum import Found, Judged, Objective, Problem
-from ringsim.analysis.verdicts import Verdict
+from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.files import whole, writing
 from ringsim.stepping.instant import Array
 from ringsim.tables import (
@@ -21,6 +30,7 @@ from ringsim.tables import (
     readable,
     unit_text,
 )
+from ringsim.variables import GOALS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -172,24 +182,66 @@ def outputs_of(problem: Problem) -> list[str]:
     return list(dict.fromkeys([*aims, *(name for name, *_ in problem.bounds)]))
 
 
+def _statistic(aim: Objective, values: Array) -> Any:
+    """Mean, quantile or share of known values along the last axis, as it is told."""
+    if aim.statistic == "probability":
+        return aim.beyond(values).mean(axis=-1)
+    if aim.statistic == "quantile":
+        return np.quantile(values, aim.probability, axis=-1, method="hazen")
+    return values.mean(axis=-1)
+
+
+def fresh_of(campaign: "xr.Dataset", problem: Problem) -> dict[str, Any]:
+    """What the fresh samples of a design say, by the keys of ``FRESH``, but for the gain; and the
+    values of the objectives, NaN of samples that do not count.
+    """
+    ended = np.isin(campaign["outcome"].to_numpy(), [*map(int, GOALS)])
+    placed, used = placement(campaign), good(campaign) & ended
+    sample, rows, kept = campaign["sample"].to_numpy(), [], []
+    for each in problem.objectives:
+        values = numbers(campaign, each.output)
+        known = used & np.isfinite(values)
+        kept.append(np.where(known, values, np.nan))
+        own = values[known]
+        if not len(own):
+            rows.append((np.nan, np.nan, np.nan))
+            continue
+        if each.statistic == "probability":
+            ends = share_interval(int(each.beyond(own).sum()), len(own))
+        else:
+            of = np.mean if each.statistic == "mean" else each.probability
+            ends = placed.interval(own, sample[known], of)
+        rows.append((float(_statistic(each, own)), *ends))
+    told = judge(campaign, problem.requirements, placed)
+    objective, lower, upper = (np.array(rows)[:, k] for k in range(3))
+    checked = f"status{CHECKED}" in campaign
+    apart = {one.name: one for one in differences(campaign)} if checked else {}
+    return {
+        "objective_value": objective, "objective_lower": lower, "objective_upper": upper,
+        "values": kept, "short": int((~used).sum()),
+        "compared": max((len(one.samples) for one in apart.values()), default=0),
+        "difference": [float(apart[name].apart.max()) if name in apart else np.nan
+                       for name in outputs_of(problem)],
+        **{name: told[name].to_numpy().astype(int if name == "verdict" else float)
+           for name in ("probability", "probability_lower", "verdict")},
+    }  # fmt: skip
+
+
 def gains(aim: Objective, present: Array, other: Array) -> tuple[float, float, float]:
     """By how much a design is better than the present one, and the interval of 95 % of that, by the
-    bootstrap of pairs; NaN where a sample has no value.
+    bootstrap of pairs; NaN where a sample has no value, and ends of a quantile that less than one
+    sample lies beyond.
     """
     known = np.isfinite(present) & np.isfinite(other)
-    if known.sum() < LEAST_OF_BOOTSTRAP:
+    if (count := int(known.sum())) < LEAST_OF_BOOTSTRAP:
         return np.nan, np.nan, np.nan
-
-    def statistic(values: Array) -> Any:
-        if aim.statistic == "probability":
-            return aim.beyond(values).mean(axis=-1)
-        return aim.shown(aim.steered(values))
-
-    picks = np.random.default_rng(0).integers(0, known.sum(), (400, known.sum()))
+    picks = np.random.default_rng(0).integers(0, count, (400, count))
     first, second = present[known], other[known]
-    middle = aim.sign * (statistic(first) - statistic(second))
-    every = aim.sign * (statistic(first[picks]) - statistic(second[picks]))
-    return float(middle), *np.quantile(every, [0.025, 0.975]).tolist()
+    middle = float(aim.sign * (_statistic(aim, first) - _statistic(aim, second)))
+    if aim.statistic == "quantile" and min(aim.probability, 1.0 - aim.probability) * count < 1.0:
+        return middle, np.nan, np.nan
+    every = aim.sign * (_statistic(aim, first[picks]) - _statistic(aim, second[picks]))
+    return middle, *np.quantile(every, [0.025, 0.975]).tolist()
 
 
 def front_tables(found: "xr.Dataset") -> list[Table]:

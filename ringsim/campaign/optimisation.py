@@ -14,10 +14,9 @@ from pydantic import ValidationError
 
 from ringsim import build, extensions
 from ringsim.analysis import derived
-from ringsim.analysis.design import endings_of, placement
-from ringsim.analysis.engines import differences
-from ringsim.analysis.front import Axis, gains, outputs_of, write_front
-from ringsim.analysis.intervals import good, numbers, quantities, share_interval
+from ringsim.analysis.design import endings_of
+from ringsim.analysis.front import Axis, fresh_of, gains, write_front
+from ringsim.analysis.intervals import quantities
 from ringsim.analysis.optimum import (
     CHECK,
     DIGITS,
@@ -31,7 +30,6 @@ from ringsim.analysis.optimum import (
     course,
 )
 from ringsim.analysis.requirements import OUTCOME
-from ringsim.analysis.verdicts import judge
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, require_no_launcher, start
@@ -499,39 +497,9 @@ def _write(course_: _Course) -> None:
 
 
 def fresh_verdict(given: Given, folder: Path) -> dict[str, Any]:
-    """What the fresh samples of a design say, by the keys of ``FRESH``, but for the gain; and the
-    values of the objectives.
-    """
+    """What the fresh samples of a design say; see ``fresh_of``."""
     with open_campaign(folder) as campaign:
-        ended = np.isin(campaign["outcome"].to_numpy(), [*map(int, GOALS)])
-        placed, used = placement(campaign), good(campaign) & ended
-        sample, rows, kept = campaign["sample"].to_numpy(), [], []
-        for each in given.problem.objectives:
-            values = numbers(campaign, each.output)
-            known = used & np.isfinite(values)
-            kept.append(np.where(known, values, np.nan))
-            own, of = values[known], np.mean if each.statistic == "mean" else each.probability
-            if not len(own):
-                rows.append((np.nan, np.nan, np.nan))
-            elif each.statistic == "probability":
-                count = int(each.beyond(own).sum())
-                rows.append((count / len(own), *share_interval(count, len(own))))
-            else:
-                middle = np.mean(own) if callable(of) else np.quantile(own, of, method="hazen")
-                rows.append((float(middle), *placed.interval(own, sample[known], of)))
-        told = judge(campaign, given.budget.constraints, placed)
-        objective, lower, upper = (np.array(rows)[:, k] for k in range(3))
-        checked = given.present.specification.check_every
-        apart = {one.name: one for one in differences(campaign)} if checked else {}
-        return {
-            "objective_value": objective, "objective_lower": lower, "objective_upper": upper,
-            "values": kept, "short": int((~used).sum()),
-            "compared": max((len(one.samples) for one in apart.values()), default=0),
-            "difference": [float(apart[name].apart.max()) if name in apart else np.nan
-                           for name in outputs_of(given.problem)],
-            **{name: told[name].to_numpy().astype(int if name == "verdict" else float)
-               for name in ("probability", "probability_lower", "verdict")},
-        }  # fmt: skip
+        return fresh_of(campaign, given.problem)
 
 
 class Optimisation:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy
 
+from ringsim.analysis.front import gains
 from ringsim.analysis.optimum import (
     CHECK,
     SEARCH,
@@ -356,6 +357,18 @@ def test_aim_is_likely_to_be_shown(samples):
 def test_too_few_samples_show_nothing():
     with pytest.raises(ValueError):  # noqa: PT011 - it has no words: files are refused before
         aimed(WANTED, 40)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_gain_in_a_quantile_is_the_difference_of_the_quantiles_beside_it(sign):
+    """Also where less than one of the samples lies beyond, and then there is no interval."""
+    stream = np.random.default_rng(4)
+    first, second = stream.lognormal(0.0, 1.0, (2, 300))
+    for probability in (0.5, 0.9, 0.999):
+        middle, low, high = gains(Objective("x", "quantile", probability, sign), first, second)
+        quantiles = [np.quantile(each, probability, method="hazen") for each in (first, second)]
+        assert middle == pytest.approx(sign * (quantiles[0] - quantiles[1]))
+        assert (low < middle < high) if probability < 0.99 else np.isnan([low, high]).all()
 
 
 def test_statistics_of_samples_by_hand():
