@@ -8,7 +8,7 @@ import netCDF4
 import numpy as np
 
 from ringsim.analysis.design import placement
-from ringsim.analysis.engines import differences
+from ringsim.analysis.engines import differences, too_far
 from ringsim.analysis.intervals import (
     CHECKED,
     LEAST_OF_BOOTSTRAP,
@@ -192,8 +192,8 @@ def _statistic(aim: Objective, values: Array) -> Any:
 
 
 def fresh_of(campaign: "xr.Dataset", problem: Problem) -> dict[str, Any]:
-    """What the fresh samples of a design say, by the keys of ``FRESH``, but for the gain; and the
-    values of the objectives, NaN of samples that do not count.
+    """What the fresh samples of a design say, by the keys of ``FRESH``, but for the gain; the
+    values of the objectives, NaN of samples that do not count; and what ``too_far`` says.
     """
     ended = np.isin(campaign["outcome"].to_numpy(), [*map(int, GOALS)])
     placed, used = placement(campaign), good(campaign) & ended
@@ -218,7 +218,7 @@ def fresh_of(campaign: "xr.Dataset", problem: Problem) -> dict[str, Any]:
     apart = {one.name: one for one in differences(campaign)} if checked else {}
     return {
         "objective_value": objective, "objective_lower": lower, "objective_upper": upper,
-        "values": kept, "short": int((~used).sum()),
+        "values": kept, "too_far": too_far(campaign), "short": int((~used).sum()),
         "compared": max((len(one.samples) for one in apart.values()), default=0),
         "difference": [float(apart[name].apart.max()) if name in apart else np.nan
                        for name in outputs_of(problem)],

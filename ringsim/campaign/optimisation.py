@@ -1,6 +1,7 @@
 """Which values make an antenna best under what is uncertain: designs that are run as campaigns."""
 
 import contextlib
+import sys
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -45,7 +46,14 @@ from ringsim.files import parse_toml, read_text, write_text, writing
 from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, holds, supply
 from ringsim.overrides import field_at, flat, in_turn, with_number
-from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain, known_or_nearest, show
+from ringsim.refusal import (
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    InputError,
+    explain,
+    known_or_nearest,
+    show,
+)
 from ringsim.sampling.table import first_inside, refuse_fixed
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
@@ -317,6 +325,8 @@ class _Course:
     verdicts: list[tuple[str, Array]] = field(default_factory=list)
     """Designs that are judged, by the names of their folders."""
     tried: int = 0  # designs that have been ordered so far
+    apart: list[str] = field(default_factory=list)
+    """Where engines differ by more than ``max_difference``, a line a design that is judged."""
 
     def order(self) -> Order:
         """The next campaign, from the results of those before."""
@@ -461,6 +471,9 @@ def run_optimisation(
         return courses[0].order()
 
     ended = start(workers, order, lambda folder: courses[0].then(folder))
+    if courses and courses[0].apart:  # on the first rank: a launcher's exit code is the largest
+        print(*courses[0].apart, sep="\n", file=sys.stderr, flush=True)
+        ended = ended._replace(code=EXIT_FAILED)
     return ended, (courses[0].folder if courses else out or Path()) / FRONT
 
 
@@ -481,11 +494,12 @@ def _write(course_: _Course) -> None:
         **build.provenance(),
     }  # fmt: skip
     fresh = {name: fresh_verdict(given, folder / name) for name, _ in course_.verdicts}
-    for told in fresh.values():  # the samples of all verdicts are the same
+    for name, told in fresh.items():  # the samples of all verdicts are the same
         pairs = zip(
             given.problem.objectives, fresh["present"]["values"], told["values"], strict=True
         )
         every = np.array([gains(aim, first, second) for aim, first, second in pairs])
+        course_.apart += [f"{name}: {line}" for line in told["too_far"]]
         told |= {"gain": every[:, 0], "gain_lower": every[:, 1], "gain_upper": every[:, 2]}
     write_front(
         folder / FRONT, given.problem, found, axes, lambda p: [*given.values(p).values()], fresh,

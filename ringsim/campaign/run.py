@@ -105,7 +105,8 @@ class Choices:
     more: bool = False
     """Whether more samples may follow: then nothing is merged or told as long as all goes well."""
     brief: bool = False
-    """Whether nothing is told of the results: what asked for them tells what they mean."""
+    """Whether nothing is told of the results: what asked for them tells what they mean, also of
+    engines that differ by more than the campaign allows."""
     label: str = ""
     """What progress is told of, instead of the campaign's name."""
 
@@ -267,7 +268,7 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
                 lines += error_lines(dataset)
             if not choices.brief:
                 lines += check_lines(dataset) + verdict_lines(dataset)
-            refused = too_far(dataset)
+                refused = too_far(dataset)  # which lines end with
         for line in lines:
             _tell(f"  {line}")
     if stop.reason and not stop.signalled and not stop.enough:

@@ -299,6 +299,34 @@ def test_command_prints_what_the_file_holds_and_draws_it(found, file, monkeypatc
     xr.testing.assert_identical(again, front)
 
 
+@pytest.mark.parametrize("wrong", [[], ["present"], ["present", "design-1"]])
+def test_engines_that_differ_too_much_in_any_design_are_told(
+    wrong, found, file, tmp_path, monkeypatch
+):
+    """Checks of three samples are made up: a third off in some designs, equal in others."""
+    shutil.copytree(found[1], tmp_path / "out")
+
+    def checked(folder):
+        made = ringsim.open_campaign(folder)
+        for name in ("status", "outcome", "reason", "peak_tension", "deployment_time"):
+            values = made[name].values.copy()
+            if name == "status":
+                values[3:] = -1
+            if name == "peak_tension" and folder.name in wrong:
+                values *= 1.5
+            made[f"{name}_checked"] = made[name].dims, values, made[name].attrs
+        return made.assign_attrs(max_difference='{"peak_tension": 0.3}')
+
+    monkeypatch.setattr(optimisation, "open_campaign", checked)
+    words = ["optimise", str(file), "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(cli, words, standalone_mode=False)
+    assert done.return_value == (3 if wrong else 0)
+    told = [line for line in done.output.splitlines() if "engines differ by more" in line]
+    assert [line.partition(":")[0] for line in told] == wrong
+    assert all("peak_tension (0.33 of the value in sample" in line for line in told)
+    assert "wrote" in done.output
+
+
 def test_what_is_missing_is_run_and_nothing_else(found, file, tmp_path):
     front, out = found
     again = tmp_path / "out"
