@@ -421,8 +421,10 @@ def _add_learnt(table: dict[str, Any], path: Path) -> tuple[str, list[str], dict
         every = {name: law.get("shared") or [name] for name, law in found.items()}
         twice = ""
         for name, paths in every.items():
-            if any(p in names or first_inside(p, names) or any(first_inside(n, [p]) for n in names)
-                   for p in paths):  # fmt: skip
+            if name in names or any(
+                p in names or first_inside(p, names) or any(first_inside(n, [p]) for n in names)
+                for p in paths
+            ):
                 twice = name
                 break
         if twice:

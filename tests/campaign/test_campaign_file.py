@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -39,6 +41,27 @@ def loaded(folder, text=GOOD):
     path = folder / "good.toml"
     path.write_text(text)
     return load_campaign(path)
+
+
+def write_posterior(path, **inputs):
+    """A file like that of a calibration."""
+    with netCDF4.Dataset(path, "w") as file:
+        file.setncatts({"inputs": json.dumps(inputs), "correlations": "[]", "clocks": "{}"})
+
+
+def test_an_input_and_one_that_was_learnt_have_no_name_in_common(tmp_path):
+    """Each gives its value to a path of its own, and may not replace the other."""
+    law = '{ kind = "normal", mean = 100e9, standard_deviation = 1e9, shared = [PATHS] }'
+    write_posterior(tmp_path / "posterior.nc", stiff={
+        "kind": "calibrated", "of": {"kind": "normal", "mean": 1.2e11, "standard_deviation": 6e9},
+        "shift": 0.0, "remaining_scatter": 0.5, "data": "stand", "shared": ["rods.young_modulus"],
+    })  # fmt: skip
+    head = GOOD.partition("[inputs]")[0] + '[inputs]\nfrom = "posterior.nc"\n'
+    own = law.replace("PATHS", '"rods.shear_modulus"')
+    with pytest.raises(InputError, match=r'stiff is given by inputs and by .* without = \["stiff"'):
+        loaded(tmp_path, f"{head}stiff = {own}\n")
+    found = loaded(tmp_path, f"{head}other = {own}\n").specification.inputs
+    assert [*found] == ["other", "stiff"]
 
 
 def test_what_the_call_sets_again_counts_where_it_is_set_last(tmp_path):
