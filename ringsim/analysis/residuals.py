@@ -17,7 +17,10 @@ from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, unit_text
-from ringsim.variables import GOALS, OF_CAMPAIGNS, Fate, Status
+from ringsim.variables import OF_CAMPAIGNS, Fate, Status
+
+_HELD = (Fate.DEPLOYED, Fate.FOLDED)
+"""Where the angles of joints stay after a run; one that is driven to its end might go on."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +164,7 @@ def _of(run: xr.Dataset, readings: Readings) -> Residuals:
     known = np.isfinite(found.values)
     times, values = found["time"].values[known], found.values[known]
     at = readings.times
-    stays = bool(readings.sensor.variable == "opening_angle" and int(run["outcome"]) in GOALS)
+    stays = bool(readings.sensor.variable == "opening_angle" and int(run["outcome"]) in _HELD)
     lock = np.nan
     if stays and "lock_time" in run and int(run["outcome"]) == Fate.DEPLOYED:
         lock = float(run["lock_time"].sel(readings.sensor.place))
@@ -199,8 +202,8 @@ def predictions(
     variable's units; NaN where a run has no value.
 
     ``offset`` (s) and ``drift`` of the clock in each run, shape (samples,), take the place of the
-    measured file's.  Runs end once an antenna is deployed: its joints stay at 180 deg.  What has
-    come to another goal stays as it was.
+    measured file's.  Runs end once an antenna is deployed: its joints stay at 180 deg.  What is
+    folded stays as it was.
     """
     clock, samples = measurement.file.clock, campaign.sizes["sample"]
     known = (0.0, 0.0) if clock is None else (clock.offset, clock.drift)
@@ -210,7 +213,7 @@ def predictions(
     scale = (1.0 + rates) / (1.0 + known[1])
     shift = starts - known[0] * scale
     outcome = campaign["outcome"].to_numpy()
-    stays = np.isin(outcome, [int(goal) for goal in GOALS])
+    stays = np.isin(outcome, [int(goal) for goal in _HELD])
     found = []
     for readings in measurement.readings:
         values = _at_place(campaign, readings)

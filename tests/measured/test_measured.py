@@ -363,6 +363,22 @@ def even_campaign() -> xr.Dataset:
     )
 
 
+@pytest.mark.parametrize("fate", [*Fate])
+def test_angles_stay_after_the_end_of_what_is_deployed_or_folded_alone(
+    fate: Fate, tmp_path: Path
+) -> None:
+    """That of the second sample, of 9.01 deg/s, ends at 108.02 deg after 2 s."""
+    stand = load_measured(even_readings(tmp_path, np.array([98.0, 100.0]), np.array([1.0, 3.0])))
+    made = even_campaign().isel(sample=[2])
+    made = made.assign(outcome=("sample", [int(fate)]))
+    stays = 108.02 if fate in (Fate.DEPLOYED, Fate.FOLDED) else np.nan
+    [angles] = predictions(made, stand)
+    np.testing.assert_allclose(angles, [[99.01, stays]])
+    [one] = residuals(made.isel(sample=0), stand)
+    np.testing.assert_allclose(one.computed, [each for each in angles[0] if np.isfinite(each)])
+    assert one.outside == int(np.isnan(stays))
+
+
 def even_readings(folder: Path, angles: np.ndarray, at: np.ndarray) -> Path:
     rows = [f"{t:.6f},{a:.9f}" for t, a in zip(at, angles, strict=True)]
     text = ENCODER.replace('"rad"', '"deg"').replace("0.002", "0.05").replace("0.01", "0.0")
