@@ -326,12 +326,11 @@ def _notes(found: "xr.Dataset", names: list[str]) -> list[str]:
         told = f" ({', '.join(amounts)})" if len(names) <= 2 else ""
         notes.append(
             "no design that was tried surely keeps to all constraints, by the quantiles that are "
-            f"aimed at: {best} is least beyond{told}"
+            f"aimed at: {best} {'are' if len(names) > 2 else 'is'} least beyond{told}"
         )
-    signs, middle = found["objective_sign"].values, found["objective_value"].values
     for k, name in enumerate(names[1:], start=1):
-        worse = signs * (middle[k] - middle[0])
-        if (worse > 0.0).all():
+        # Over pairs: runs that fail in one of both alone would shift its statistic.
+        if (found["gain"].values[k] < 0.0).all():
             why = "which keeps to all constraints: keep that one" if keeps[0] else (
                 "which does not keep to all constraints" if keeps[k]
                 else "and neither keeps to all constraints")  # fmt: skip

@@ -268,7 +268,7 @@ def test_nothing_that_reaches_its_goal_is_said(tmp_path):
 def test_tables_say_what_is_broken_and_worse(found):
     front = found[0].copy(deep=True)
     front["check_beyond"][:] = [[0.5], [0.2]]
-    front["objective_value"][1] = front["objective_value"][0] + 1.0
+    front["gain"][1] = -1.0
     front["without_beyond"][1] = 0.3
     text = "\n".join(line for table in front_tables(front) for line in table.lines())
     assert "no design that was tried surely keeps to all" in text
@@ -283,6 +283,20 @@ def test_tables_say_what_is_broken_and_worse(found):
     front["check_beyond"][:] = [[-0.5], [-0.2]]
     text = "\n".join(line for table in front_tables(front) for line in table.lines())
     assert "keeps to all constraints: keep that one" in text
+    # Its statistic is larger, as of samples that failed at present, and each pair is better.
+    front["gain"][1] = 0.1
+    front["objective_value"][1] = front["objective_value"][0] + 1.0
+    text = "\n".join(line for table in front_tables(front) for line in table.lines())
+    assert "worse than the present design" not in text
+
+
+def test_several_designs_are_least_beyond(found):
+    front = found[0]
+    front = xr.concat([front, front.sel(design=["design-1"])], "design", data_vars="minimal")
+    front = front.assign_coords(design=["present", "design-1", "design-2"])
+    front["check_beyond"][:] = 0.5
+    text = "\n".join(line for table in front_tables(front) for line in table.lines())
+    assert "design-1 and design-2 are least beyond" in text
 
 
 def test_command_prints_what_the_file_holds_and_draws_it(found, file, monkeypatch):
