@@ -462,12 +462,27 @@ def half_width(condition: Condition, campaign: xr.Dataset, placed: Placement) ->
     return (high - low) / 2
 
 
+def _samples_of(campaign: xr.Dataset) -> int:
+    """Samples of the whole merged campaign, of which there may be a selection."""
+    says = campaign.attrs
+    every = says.get("stopped_after", says.get("planned_samples", campaign.sizes["sample"]))
+    return int(every)
+
+
+def looked_at(campaign: xr.Dataset) -> int:
+    """Samples up to which a campaign's rule has looked: those that have run, and of a selection
+    those of the whole campaign.
+    """
+    every, run = _samples_of(campaign), int((campaign["status"].to_numpy() >= 0).sum())
+    return every if campaign.sizes["sample"] < every else run
+
+
 def stopping_lines(campaign: xr.Dataset, placed: Placement) -> list[str]:
     """What became of the rule of a merged campaign, a line; none if it has none."""
     says = campaign.attrs
     if (rule := rule_of(says)) is None:
         return []
-    count, most = campaign.sizes["sample"], int(says.get("planned_samples", 0))
+    count, most = _samples_of(campaign), int(says.get("planned_samples", 0))
     if "stopped_after" in says:
         taken = [*rule.numbers(count, placed.replicates), count]
         first = f"stop_when ended the campaign after {count} of at most {most} samples, because "

@@ -35,7 +35,7 @@ from ringsim.analysis.intervals import (
     share_bounds,
     standard_error,
 )
-from ringsim.analysis.requirements import OUTCOME, Requirement, rule_of, violations
+from ringsim.analysis.requirements import OUTCOME, Requirement, looked_at, rule_of, violations
 from ringsim.analysis.verdicts import Verdict, verdict_of
 from ringsim.overrides import parse_value
 from ringsim.refusal import InputError, explain, known_or_nearest, show
@@ -532,7 +532,7 @@ def _verdicts(
         broken, ends = violations(campaign, name, wanted), NONE
         levels = wanted.confidence, wanted.confidence
         if rule is not None:  # it ended the campaign by its results
-            levels = rule.levels(name, wanted, int(run.sum()), placed.replicates)
+            levels = rule.levels(name, wanted, looked_at(campaign), placed.replicates)
         if has_share_intervals(placed):
             for end, level, own in zip((0, 1), levels, (broken | ~held, broken), strict=True):
                 cap = Cap(pairs, int(run.sum()), 1.0 - level)

@@ -40,6 +40,7 @@ from ringsim.analysis.requirements import (
     Rule,
     doubt_of,
     half_width,
+    looked_at,
     require_values,
     rule_of,
     violations,
@@ -141,10 +142,9 @@ def _together(
     for name, wanted in requirements.items():
         kept &= ~violations(campaign, name, wanted)
     sure, ends = max(each.confidence for each in requirements.values()), (np.nan, np.nan)
-    looked = int(run.sum())
     levels = [sure, sure] if rule is None else [
         max(each) for each in zip(*(
-            rule.levels(name, wanted, looked, placed.replicates)
+            rule.levels(name, wanted, looked_at(campaign), placed.replicates)
             for name, wanted in requirements.items()
         ), strict=True)
     ]  # fmt: skip
@@ -219,7 +219,7 @@ def _judged(
         short &= ~np.isfinite(numbers(campaign, "deployment_time"))
     place = campaign["sample"].to_numpy()
     levels = wanted.confidence, wanted.confidence
-    looked = int((campaign["status"].to_numpy() >= 0).sum())
+    looked = looked_at(campaign)
     if rule is not None:
         levels = rule.levels(name, wanted, looked, placed.replicates)
     low, high, change = 0.0, 1.0, False

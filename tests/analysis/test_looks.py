@@ -85,6 +85,23 @@ def test_the_further_samples_of_a_rule_are_at_a_look_that_ends_it():
     assert plain.probability_lower > found.probability_lower
 
 
+def test_a_selection_of_a_campaign_that_ended_early_tells_its_looks():
+    """Of 324 samples without a violation; bounds by hand, with the confidence of all of them."""
+    wanted = {"asynchrony_max": {"max": 1.0, "probability": 0.99, "confidence": 0.9}}
+    made = campaign(np.full(324, 0.5), design={"kind": "random", "samples": 5000})
+    made.attrs |= {"stop_when": RULE.model_dump_json(exclude_none=True), "stopped_after": 324,
+                   "planned_samples": 5000, "stop_reason": "it is met"}  # fmt: skip
+    right = analyse(made, wanted)
+    for chosen in (slice(3), slice(-100, None), np.arange(0, 324, 2)):
+        part = made.isel(sample=chosen)
+        found = analyse(part, wanted)
+        assert found.attrs["stopping"] == right.attrs["stopping"]
+        assert "ended the campaign after 324 of at most 5000 samples" in found.attrs["stopping"]
+        assert found.confidence_lower.item() == right.confidence_lower.item()
+        error = 1.0 - right.confidence_lower.item()
+        assert found.probability_lower.item() == pytest.approx(error ** (1 / part.sizes["sample"]))
+
+
 @pytest.mark.parametrize("quantile", [pytest.param(None, marks=pytest.mark.slow), 0.9])
 def test_intervals_at_the_end_are_nearly_those_of_fixed_samples(quantile):
     """95 % intervals cover 92 % at least where their own length has ended the campaign."""
