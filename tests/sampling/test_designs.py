@@ -125,6 +125,16 @@ def test_grid_crosses_all_levels(base):
     assert values(table, "rods.elements")[:4].tolist() == [1, 2, 4, 1]
 
 
+def test_levels_of_an_input_are_those_of_all_its_places_but_one_that_is_named(base):
+    law = {"kind": "uniform", "low": 1e11, "high": 2e11, "each_section": True}
+    inputs = {"rods.young_modulus": law, "loads.force": {"kind": "discrete", "values": [0.01]}}
+    levels = {"rods.young_modulus": 2, "rods.young_modulus[4]": 3}
+    modulus, _ = (c.values for c in drawn(base, {"kind": "grid", "levels": levels}, inputs).columns)
+    counts = [len(np.unique(each)) for each in modulus.T]
+    assert counts == [2, 2, 2, 3, 2, 2]
+    assert len(np.unique(modulus, axis=0)) == len(modulus) == np.prod(counts)
+
+
 def test_one_input_at_a_time_leaves_the_base_case(base):
     inputs = {
         "rods.young_modulus": {"kind": "uniform", "low": 1e11, "high": 2e11, "each_section": True},

@@ -3,7 +3,7 @@
 import csv
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -33,17 +33,13 @@ class Grid(Design):
 
     kind: Literal["grid"] = "grid"
     levels: Levels | dict[str, Levels] = 3
-    """Points of every continuous input, or a table with one entry per path."""
+    """Points of every continuous input, or a table with one entry per path, 3 for those that it
+    leaves out."""
 
     def points(self, factors: Factors, seed: int) -> Array:
         """All combinations of the inputs' levels."""
-        counts, default = (self.levels, 3) if isinstance(self.levels, dict) else ({}, self.levels)
-        for path in counts:
-            if path not in factors:
-                raise InputError(
-                    f'design.levels."{path}" is not an input ({known_or_nearest(path, factors)})'
-                )
-        lines = [each.levels(counts.get(path, default)) for path, each in factors.items()]
+        counts = _by_path("levels", self.levels, list(factors), 3)
+        lines = [each.levels(counts[path]) for path, each in factors.items()]
         size = math.prod(len(line) for line in lines)
         if size > MOST_POINTS:
             raise InputError(
@@ -51,6 +47,23 @@ class Grid(Design):
                 "use fewer levels"
             )
         return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(size, -1)
+
+
+def _by_path(
+    key: str, given: int | Mapping[str, int], paths: Sequence[str], default: int
+) -> dict[str, int]:
+    """What a design says of every factor: one number, or a table by path or by input, whose places
+    take it.
+    """
+    if isinstance(given, int):
+        return dict.fromkeys(paths, given)
+    inputs = {path: path.rpartition("[")[0] for path in paths}
+    names = {*paths, *inputs.values()} - {""}
+    for path in given:
+        if path not in names:
+            hint = known_or_nearest(path, names)
+            raise InputError(f'design.{key}."{path}" is not an input ({hint})')
+    return {path: given.get(path, given.get(inputs[path], default)) for path in paths}
 
 
 class RandomDesign(Design):
@@ -297,20 +310,13 @@ class OneAtATime(Design):
     def points(self, factors: Factors, seed: int) -> Array:
         """The base case, then input by input in their order, shape (samples, factors)."""
         lines = {path: each.levels(self.levels) for path, each in factors.items()}
-        places = {path: self._base(path) for path in lines}
+        places = _by_path("base", self.base, list(lines), _BASE)
         for path, line in lines.items():
             if places[path] > len(line):
                 raise InputError(
                     f"design.base = {places[path]} for {path}, which has {len(line)} levels: "
                     "give one of these"
                 )
-        if isinstance(self.base, dict):
-            names = {path.rpartition("[")[0] for path in lines} | set(lines)
-            for path in self.base:
-                if path not in names:
-                    raise InputError(
-                        f'design.base."{path}" is not an input ({known_or_nearest(path, names)})'
-                    )
         middle = np.array([line[places[path] - 1] for path, line in lines.items()])
         rows = [middle]
         for axis, (path, line) in enumerate(lines.items()):
@@ -318,8 +324,3 @@ class OneAtATime(Design):
                 rows.append(middle.copy())
                 rows[-1][axis] = value
         return np.array(rows)
-
-    def _base(self, path: str) -> int:
-        if not isinstance(self.base, dict):
-            return self.base
-        return self.base.get(path, self.base.get(path.rpartition("[")[0], _BASE))
