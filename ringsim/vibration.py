@@ -1,10 +1,12 @@
 """Natural frequencies and shapes along the opening: their dataset, and its tables."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
+from numbers import Integral
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +14,7 @@ import xarray as xr
 from ringsim import build
 from ringsim.choice import kind_of
 from ringsim.frame.modes import ENERGY_PARTS, Modes, Standing
-from ringsim.refusal import InputError
+from ringsim.refusal import InputError, show
 from ringsim.scene import Scene, load_scene
 from ringsim.structures.pantograph_ring import LEAST_OPENING
 from ringsim.tables import Table, counted
@@ -69,7 +71,7 @@ def modes(
     (('angle', 'mode'), 6)
     """
     chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene
-    _require("count", count, 1, _MOST_MODES)
+    _require_whole("count", count, 1, _MOST_MODES)
     _require("tension", tension, 0.0, 1e6, " N")
     angles = angles_of(chosen, at, points)
     held = [angle == DEPLOYED if latched is None else latched for angle in angles]
@@ -89,8 +91,10 @@ def angles_of(scene: Scene, at: Sequence[float | str] | None, points: int) -> li
         )
     words = {"stowed": float(scene.structure.opening_angle), "deployed": DEPLOYED}  # type: ignore[attr-defined]
     if at is None:
-        _require("points", points, 2, _MOST_ANGLES)
+        _require_whole("points", points, 2, _MOST_ANGLES)
         return [float(x) for x in np.linspace(words["stowed"], DEPLOYED, points).round(6)]
+    if isinstance(at, str) or not isinstance(at, Iterable):
+        raise InputError(f"at = {show(at)} must be a list of opening angles: write [{show(at)}]")
     found = []
     for each in at:
         if isinstance(each, str) and (word := each.strip().lower()) in words:
@@ -98,7 +102,7 @@ def angles_of(scene: Scene, at: Sequence[float | str] | None, points: int) -> li
             continue
         try:
             angle = float(each)
-        except ValueError:
+        except (TypeError, ValueError):
             raise InputError(
                 f"at = {each!r} is no opening angle: give degrees from {LEAST_OPENING:g} to 180, "
                 f"or one of {', '.join(_WORDS)}"
@@ -118,6 +122,12 @@ def angles_of(scene: Scene, at: Sequence[float | str] | None, points: int) -> li
 def _require(name: str, value: float, least: float, most: float, unit: str = "") -> None:
     if not least <= value <= most:
         raise InputError(f"{name} = {value:g}{unit} must be from {least:g} to {most:g}{unit}")
+
+
+def _require_whole(name: str, value: Any, least: int, most: int) -> None:
+    if not isinstance(value, Integral):
+        raise InputError(f"{name} = {show(value)} must be a whole number from {least} to {most}")
+    _require(name, int(value), least, most)
 
 
 def _dataset(

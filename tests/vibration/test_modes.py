@@ -63,6 +63,29 @@ def test_bad_input_is_refused_in_one_line(words: list[str], told: str) -> None:
     assert len(printed.splitlines()) == 1
 
 
+@for_each(
+    "given, told",
+    [
+        ({"at": 60}, "at = 60 must be a list of opening angles: write [60]"),
+        (
+            {"at": "deployed"},
+            'at = "deployed" must be a list of opening angles: write ["deployed"]',
+        ),
+        ({"at": [None]}, "at = None is no opening angle"),
+        ({"at": []}, "number of angles = 0 must be from 1"),
+        ({"count": 2.5}, "count = 2.5 must be a whole number from 1 to 100"),
+        ({"count": "6"}, 'count = "6" must be a whole number'),
+        ({"count": 101}, "count = 101 must be from 1 to 100"),
+        ({"points": 3.0}, "points = 3.0 must be a whole number"),
+    ],
+)
+@pytest.mark.quick
+def test_arguments_that_are_none_are_refused(given: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError) as error:
+        ringsim.modes(RING, **given)
+    assert told in str(error.value)
+
+
 @pytest.mark.quick
 def test_other_structures_are_refused() -> None:
     assert called("planar-truss") == (
