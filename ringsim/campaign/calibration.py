@@ -3,7 +3,7 @@
 import contextlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +28,10 @@ from ringsim.campaign.folder import open_folder
 from ringsim.campaign.python import campaign_text, open_campaign
 from ringsim.campaign.run import Ended, Order, listed_cases, require_no_launcher, start
 from ringsim.campaign.specification import Campaign, Stages, campaign_of, refuse_other
-from ringsim.files import parse_toml, read_text, whole, writing
+from ringsim.files import DESIGN, parse_toml, read_text, whole, writing
 from ringsim.measured import Measurement, Told, load_measured
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
-from ringsim.sampling.columns import Axis, Table, add_inputs, alike, correlate, pairs_of
+from ringsim.sampling.columns import Axis, Unknowns, add_inputs, alike, correlate, marks, pairs_of
 from ringsim.sampling.designs.independent import sobol_points
 from ringsim.sampling.distributions import Array, Calibrated, Ranged, inside
 from ringsim.scene import Scene
@@ -118,7 +118,7 @@ def calibration_of(
     measurement = load_measured(path.parent / budget.measured, planned=True)
     found = Given(campaign, measurement, budget)
     check_sensors(measurement, campaign.scene)
-    unknowns = len(Unknowns.of(found).names)
+    unknowns = len(unknowns_of(found).names)
     if found.members < (least := MEMBERS_AN_UNKNOWN * (unknowns + 1)):
         raise InputError(
             f"{path.name}: runs = {budget.runs}: {found.members} in each of {budget.stages} stages "
@@ -127,99 +127,45 @@ def calibration_of(
     return found
 
 
-@dataclass(frozen=True)
-class Unknowns:
-    """The unknowns of a calibration: those of the scene, then those of the measured clock."""
-
-    template: Table
-    axes: tuple[Axis, ...]
-    lower: Array
-    """Root L of the priors' correlations R = L L', shape (unknowns, unknowns): a point w of
-    standard normal space is at u = L w, each u_k N(0, 1)."""
-
-    @classmethod
-    def of(cls, given: Given) -> "Unknowns":
-        """Those that a calibration asks for; InputError if one is no number of a range."""
-        asked, file = given.campaign.specification, given.campaign.file.name
-        table, found, numbers = given.campaign.draw(), dict[str, Axis](), dict[str, str]()
-        for column in table.columns:
-            law = asked.inputs[column.input]
-            if not isinstance(law, Ranged | Calibrated):
+def unknowns_of(given: Given) -> Unknowns:
+    """Those that a calibration asks for; InputError if one is no number of a range."""
+    asked, file = given.campaign.specification, given.campaign.file.name
+    table, found, numbers = given.campaign.draw(), dict[str, Axis](), dict[str, str]()
+    for column in table.columns:
+        law = asked.inputs[column.input]
+        if not isinstance(law, Ranged | Calibrated):
+            raise InputError(
+                f"{file}: inputs.{column.input}: only numbers that may lie anywhere in a range "
+                "can be found from data: give it a continuous distribution"
+            )
+        bare = law.model_copy(update={"shared": (), "each_section": False})
+        for k, mark in enumerate(marks(column.values, () if law.shared else column.places)):
+            numbers[f"{column.input}[{k + 1}]"] = f"{column.input}{mark}"
+            shared = tuple(f"{path}{mark}" for path in law.shared)
+            # Of a posterior each place is an input of its own: together again here.
+            group = column.input.partition("[")[0]
+            found[f"{column.input}{mark}"] = Axis(
+                f"{column.input}{mark}", bare, column.units, group, column.input, shared
+            )
+    for name, units in {"offset": "s", "drift": "1"}.items():
+        if (law := getattr(given.budget.clock, name)) is not None:
+            if given.measurement.file.clock is None:
+                raise InputError(f"{file}: clock.{name}: the measured data have no clock")
+            if not isinstance(law, Ranged | Calibrated) or law.each_section or law.shared:
                 raise InputError(
-                    f"{file}: inputs.{column.input}: only numbers that may lie anywhere in a range "
-                    "can be found from data: give it a continuous distribution"
+                    f"{file}: clock.{name}: must be one number of a range: give it a "
+                    "continuous distribution, without each_section and shared"
                 )
-            bare = law.model_copy(update={"shared": (), "each_section": False})
-            for k, mark in enumerate(_marks(column.values, () if law.shared else column.places)):
-                numbers[f"{column.input}[{k + 1}]"] = f"{column.input}{mark}"
-                shared = tuple(f"{path}{mark}" for path in law.shared)
-                # Of a posterior each place is an input of its own: together again here.
-                group = column.input.partition("[")[0]
-                found[f"{column.input}{mark}"] = Axis(
-                    f"{column.input}{mark}", bare, column.units, group, column.input, shared
-                )
-        for name, units in {"offset": "s", "drift": "1"}.items():
-            if (law := getattr(given.budget.clock, name)) is not None:
-                if given.measurement.file.clock is None:
-                    raise InputError(f"{file}: clock.{name}: the measured data have no clock")
-                if not isinstance(law, Ranged | Calibrated) or law.each_section or law.shared:
-                    raise InputError(
-                        f"{file}: clock.{name}: must be one number of a range: give it a "
-                        "continuous distribution, without each_section and shared"
-                    )
-                own = f"clock.{name}"
-                found[own] = Axis(own, law, units, own, own)
-        found = alike(found)
-        matrix = np.eye(len(found))
-        pairs = [pair.renamed(numbers) for pair in asked.correlations]
-        for pair, one, other in pairs_of(list(found), pairs):
-            matrix[one, other] = matrix[other, one] = pair.coefficient
-        correlate(np.full((1, len(found)), 0.5), list(found), pairs)  # refuses others
-        lower = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
-        return cls(table, tuple(found.values()), lower)
-
-    @property
-    def names(self) -> list[str]:
-        """Of the axes."""
-        return [axis.name for axis in self.axes]
-
-    def values(self, points: Array) -> dict[str, Array]:
-        """Values by axis at points of standard normal space, shape (samples, unknowns)."""
-        normal = points @ self.lower.T
-        return {a.name: a.law.of_normal(normal[:, k]) for k, a in enumerate(self.axes)}
-
-    def at(self, points: Array) -> Table:
-        """The inputs of the scene there."""
-        known, columns = self.values(points), []
-        for column in self.template.columns:
-            own = [known[a.name] for a in self.axes if a.input == column.input]
-            values = np.stack(own, axis=1) if column.dim else own[0]
-            columns.append(replace(column, values=values))
-        return Table(tuple(columns), np.arange(len(points), dtype=np.int64))
-
-    def cases(self, points: Array) -> list[dict[str, float]]:
-        """Values by scene path of each point, one value to a path."""
-        found, table = [], self.at(points)
-        for sample in range(len(points)):
-            row = dict[str, float]()
-            for column in table.columns:
-                each = np.atleast_1d(column.values[sample])
-                marks = _marks(column.values, ())
-                row |= {f"{column.path}{m}": float(v) for m, v in zip(marks, each, strict=True)}
-            found.append(row)
-        return found
-
-    def spread(self, learnt: Learnt) -> tuple[Array, Array]:
-        """Mean and covariance of u."""
-        found = learnt.posterior
-        return self.lower @ found.mean, self.lower @ found.covariance @ self.lower.T
-
-
-def _marks(values: Array, places: tuple[str, ...]) -> list[str]:
-    """What follows a path: nothing, or the number or name of each place."""
-    if values.ndim == 1:
-        return [""]
-    return [f'["{p}"]' for p in places] or [f"[{k + 1}]" for k in range(values.shape[1])]
+            own = f"clock.{name}"
+            found[own] = Axis(own, law, units, own, own)
+    found = alike(found)
+    matrix = np.eye(len(found))
+    pairs = [pair.renamed(numbers) for pair in asked.correlations]
+    for pair, one, other in pairs_of(list(found), pairs):
+        matrix[one, other] = matrix[other, one] = pair.coefficient
+    correlate(np.full((1, len(found)), 0.5), list(found), pairs)  # refuses others
+    lower = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    return Unknowns(table, tuple(found.values()), lower)
 
 
 @dataclass
@@ -248,7 +194,8 @@ class _Course:
         given, asked = self.given, self.given.campaign.specification
         if not self.planning:
             given.require_readings()
-        unknowns, number = Unknowns.of(given), len(self.points)
+        unknowns, number = unknowns_of(given), len(self.points)
+        held = self._held()[number]
         if number:
             self._learn(unknowns)
         stream = np.random.default_rng([asked.seed, number])
@@ -277,11 +224,29 @@ class _Course:
             if str(self.folder) in str(error):
                 cure = f"choose another folder with --out, or delete {name} and later stages"
             raise InputError(f"{given.campaign.file.name}: {title}: {error}: {cure}") from None
-        if not number:
+        if held < given.members:
             # What an earlier call has found is not what this one finds.
             (self.folder / (SENSORS if self.planning else POSTERIOR)).unlink(missing_ok=True)
         last = number + 1 == stages
         return Order(campaign, self.folder / name, more=not last, brief=True)
+
+    def _held(self) -> list[int]:
+        """Runs of each stage in the folder, 0 of those that it has not; InputError if stages with
+        other numbers have followed from one.
+        """
+        given, sizes = self.given, list[int]()
+        for number in range(given.budget.stages):
+            path = self.folder / f"stage-{number + 1}"
+            sizes.append(open_folder(path).table.samples if (path / DESIGN).exists() else 0)
+        for number, size in enumerate(sizes):
+            if size > given.members or (0 < size < given.members and any(sizes[number + 1 :])):
+                raise InputError(
+                    f"{given.campaign.file.name}: runs = {given.budget.runs}: stages of "
+                    f"{given.members} runs, and stage-{number + 1} in {self.folder} has {size}: "
+                    f"set runs = {size * given.budget.stages} to go on with it, or choose another "
+                    "folder with --out"
+                )
+        return sizes
 
     def _accepted(self, points: Array, unknowns: Unknowns, scene: Scene) -> Array:
         """Points of a stage whose values the scene takes: where the map of a wide ensemble has
@@ -302,7 +267,7 @@ class _Course:
         """Learn from the last stage, unless runs are missing, and write what all have told."""
         ordered = len(self.points) == self.given.budget.stages
         if ordered and not len(open_folder(folder).survey().missing):
-            self._learn(Unknowns.of(self.given))
+            self._learn(unknowns_of(self.given))
             self.ended(self)
 
     def _learn(self, unknowns: Unknowns) -> None:
@@ -384,9 +349,9 @@ def run_course(
 def _write_posterior(course: _Course) -> None:
     """The file of a posterior: samples of it, and what it says of unknowns and sensors."""
     given, last = course.given, course.stages[-1]
-    asked, unknowns = given.campaign.specification, Unknowns.of(given)
+    asked, unknowns = given.campaign.specification, unknowns_of(given)
     names, sensors = unknowns.names, [fit.sensor for fit in last.fits]
-    mean, covariance = unknowns.spread(last)
+    mean, covariance = unknowns.spread(*last.posterior[:2])
     deviation = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(deviation, deviation)
     stream = np.random.default_rng([asked.seed, len(course.stages)])
@@ -446,7 +411,8 @@ def _write_posterior(course: _Course) -> None:
                 "over the scatter of a reading"),
         "chance_of_all": (("test",), [*last.chances.values()], "probability by scatter alone"),
         "stage_learnt": (("stage", "unknown"),
-                         [np.sqrt(np.diag(unknowns.spread(s)[1])) for s in course.stages],
+                         [np.sqrt(np.diag(unknowns.spread(*stage.posterior[:2])[1]))
+                          for stage in course.stages],
                          "learnt, after each stage"),
         "lost": (per_stage, course.lost, "runs that failed"),
         "unused": ((), course.unused, "readings that some run has no value for"),
@@ -507,7 +473,7 @@ def _clocks(given: Given, medians: Mapping[str, float]) -> dict[str, dict[str, l
 
 def _write_sensors(course: _Course) -> None:
     """The file of a plan of sensors, the one that tells most first."""
-    unknowns = Unknowns.of(course.given)
+    unknowns = unknowns_of(course.given)
     told = [each for each in course.told if len(each.measured)]
     silent = [each.sensor for each in course.told if not len(each.measured)]
     found = rank(course.points[-1], told, unknowns.lower)

@@ -324,3 +324,56 @@ def alike(axes: dict[str, Axis]) -> dict[str, Axis]:
     usual = {group: each.most_common(1)[0][0] for group, each in of.items()}
     return {name: a if priors[name] == usual[a.group] else replace(a, group=name)
             for name, a in axes.items()}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """The unknowns of a calibration: those of the scene, then those of the measured clock."""
+
+    template: Table
+    axes: tuple[Axis, ...]
+    lower: Array
+    """Root L of the priors' correlations R = L L', shape (unknowns, unknowns): a point w of
+    standard normal space is at u = L w, each u_k N(0, 1)."""
+
+    @property
+    def names(self) -> list[str]:
+        """Of the axes."""
+        return [axis.name for axis in self.axes]
+
+    def values(self, points: Array) -> dict[str, Array]:
+        """Values by axis at points of standard normal space, shape (samples, unknowns)."""
+        normal = points @ self.lower.T
+        return {a.name: a.law.of_normal(normal[:, k]) for k, a in enumerate(self.axes)}
+
+    def at(self, points: Array) -> Table:
+        """The inputs of the scene there."""
+        known, columns = self.values(points), []
+        for column in self.template.columns:
+            own = [known[a.name] for a in self.axes if a.input == column.input]
+            values = np.stack(own, axis=1) if column.dim else own[0]
+            columns.append(replace(column, values=values))
+        return Table(tuple(columns), np.arange(len(points), dtype=np.int64))
+
+    def cases(self, points: Array) -> list[dict[str, float]]:
+        """Values by scene path of each point, one value to a path."""
+        found, table = [], self.at(points)
+        for sample in range(len(points)):
+            row = dict[str, float]()
+            for column in table.columns:
+                each = np.atleast_1d(column.values[sample])
+                own = marks(column.values, ())
+                row |= {f"{column.path}{m}": float(v) for m, v in zip(own, each, strict=True)}
+            found.append(row)
+        return found
+
+    def spread(self, mean: Array, covariance: Array) -> tuple[Array, Array]:
+        """Mean and covariance of u, from those of w."""
+        return self.lower @ mean, self.lower @ covariance @ self.lower.T
+
+
+def marks(values: Array, places: tuple[str, ...]) -> list[str]:
+    """What follows a path: nothing, or the number or name of each place."""
+    if values.ndim == 1:
+        return [""]
+    return [f'["{p}"]' for p in places] or [f"[{k + 1}]" for k in range(values.shape[1])]

@@ -25,6 +25,7 @@ from ringsim.analysis import derived
 from ringsim.analysis.posterior import calibration_tables
 from ringsim.analysis.residuals import clock_line, residual_statistics, residuals
 from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
+from ringsim.campaign.run import Ended
 from ringsim.cli import cli
 from ringsim.measured import load_measured
 from ringsim.plots.comparison import learnt
@@ -385,6 +386,51 @@ def test_what_is_refused_leaves_what_was_found(test_files, found, tmp_path):
     assert refused.exit_code == 2
     assert "this folder has another campaign" in refused.output
     assert equal(out / POSTERIOR, found[1] / POSTERIOR)
+
+
+def test_other_readings_are_refused_and_leave_what_was_found(test_files, found, tmp_path):
+    """The first stage is that of the priors alone, and so the same; the second is not."""
+    for name in ("stand.toml", "ring.toml", "cal.toml"):
+        shutil.copy(test_files.parent / name, tmp_path)
+    rows = (test_files.parent / "stand.csv").read_text().splitlines()
+    cells = rows[4].split(",")
+    rows[4] = ",".join([cells[0], f"{float(cells[1]) + 0.1:.6f}", *cells[2:]])
+    (tmp_path / "stand.csv").write_text("\n".join(rows))
+    out = tmp_path / "out"
+    shutil.copytree(found[1], out)
+    told = CliRunner().invoke(cli, ["calibrate", str(tmp_path / "cal.toml"), "--out", str(out)])
+    assert told.exit_code == 2
+    assert "stage 2 of 3" in told.output
+    assert equal(out / POSTERIOR, found[1] / POSTERIOR)
+
+
+@pytest.mark.parametrize(("runs", "stages"), [(96, 3), (36, 3), (100, 2)])
+def test_stages_of_other_sizes_are_refused_before_any_of_them_grows(
+    runs, stages, test_files, found, tmp_path
+):
+    out = tmp_path / "out"
+    shutil.copytree(found[1], out)
+    held = {path: path.stat().st_mtime_ns for path in out.rglob("*")}
+    words = ["--set", f"runs={runs}", "--set", f"stages={stages}", "--out", str(out)]
+    told = CliRunner().invoke(cli, ["calibrate", str(test_files), *words])
+    assert told.exit_code == 2
+    assert f"runs = {runs}: stages of {runs // stages} runs, and stage-1 in" in told.output
+    assert f"has 16: set runs = {16 * stages} to go on with it" in told.output
+    assert {path: path.stat().st_mtime_ns for path in out.rglob("*")} == held
+
+
+def test_what_was_found_goes_once_a_stage_is_run_anew(test_files, found, tmp_path, monkeypatch):
+    """As of stages that were deleted: an interrupted call would leave what is no longer true."""
+    out = tmp_path / "out"
+    shutil.copytree(found[1], out)
+    for stage in (2, 3):
+        shutil.rmtree(out / f"stage-{stage}")
+    monkeypatch.setattr(
+        calibration, "start", lambda _, order, then: order() and order() and Ended()
+    )
+    calibration.run_course(lambda: ringsim.Calibration.read(test_files)._given, 0, out)
+    assert (out / "stage-2").exists()
+    assert not (out / POSTERIOR).exists()
 
 
 def test_too_many_failed_runs_end_it_in_one_line(test_files, tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ import pytest
 import tomli_w
 from loops import for_each
 
-from ringsim.campaign.calibration import Unknowns, calibration_of
+from ringsim.campaign.calibration import calibration_of, unknowns_of
 from ringsim.campaign.specification import campaign_of
 from ringsim.refusal import InputError
 
@@ -68,7 +68,7 @@ def test_calibrations_take_such_correlations_too(called: tuple[str, str]) -> Non
     file = ROOT / "campaigns" / "stand" / "pulleys" / "pulleys.toml"
     pair = {"between": [f"{UPPER}{called[0]}", f"{LOWER}{called[1]}"], "coefficient": 0.5}
     text = tomli_w.dumps(tomllib.loads(file.read_text()) | {"correlations": [pair]})
-    unknowns = Unknowns.of(calibration_of(text, file))
+    unknowns = unknowns_of(calibration_of(text, file))
     one, other = (unknowns.names.index(f"{name}[{CALLED}]") for name in (UPPER, LOWER))
     assert (unknowns.lower @ unknowns.lower.T)[one, other] == pytest.approx(0.5)
 
