@@ -30,6 +30,7 @@ from ringsim.campaign.run import Ended, Order, listed_cases, require_no_launcher
 from ringsim.campaign.specification import Campaign, Stages, campaign_of, refuse_other
 from ringsim.files import DESIGN, parse_toml, read_text, whole, writing
 from ringsim.measured import Measurement, Told, load_measured
+from ringsim.overrides import at_path
 from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
 from ringsim.sampling.columns import Axis, Unknowns, add_inputs, alike, correlate, marks, pairs_of
 from ringsim.sampling.designs.independent import sobol_points
@@ -209,6 +210,12 @@ class _Course:
         stages = given.budget.stages
         name, title = f"stage-{number + 1}", f"stage {number + 1} of {stages}"
         scene = given.campaign.scene.with_values({"record.interval": _interval(given)})
+        # Cases have one value to a place, and lists of them begin with one value for all.
+        scene = scene.with_values({
+            column.path: float(asked.inputs[column.input].quantile(np.array([0.5]))[0])
+            for column in unknowns.template.columns
+            if column.dim and at_path(scene, column.path) is None
+        })  # fmt: skip
         try:
             points = self._accepted(points, unknowns, scene)
             self.points.append(points)

@@ -28,6 +28,7 @@ from ringsim.campaign.calibration import POSTERIOR, SENSORS, calibration_of
 from ringsim.campaign.run import Ended
 from ringsim.cli import cli
 from ringsim.measured import load_measured
+from ringsim.overrides import at_path
 from ringsim.plots.comparison import learnt
 from ringsim.refusal import InputError
 from ringsim.sampling.distributions import Calibrated, Lognormal, Truncated, Uniform
@@ -417,6 +418,24 @@ def test_stages_of_other_sizes_are_refused_before_any_of_them_grows(
     assert f"runs = {runs}: stages of {runs // stages} runs, and stage-1 in" in told.output
     assert f"has 16: set runs = {16 * stages} to go on with it" in told.output
     assert {path: path.stat().st_mtime_ns for path in out.rglob("*")} == held
+
+
+def test_places_of_what_the_scene_has_not_may_be_unknown(test_files, tmp_path):
+    """Hinges without friction in the scene; drawn about the prior's median."""
+    for name in ("stand.toml", "stand.csv"):
+        shutil.copy(test_files.parent / name, tmp_path)
+    law = {"kind": "lognormal", "mean": 0.01, "standard_deviation": 0.001, "each_section": True}
+    path = "joints.hinge.viscous"
+    assert at_path(scene(), path) is None
+    file = write_file(tmp_path, 16, 1, inputs={path: law})
+    posterior = ringsim.Calibration.read(file).run(workers=0, out=tmp_path / "out")
+    assert posterior["unknown"].values.tolist() == [f"{path}[{k + 1}]" for k in range(3)]
+    with xr.open_dataset(tmp_path / "out" / "stage-1" / "campaign.nc") as runs:
+        drawn = np.array([runs[f"joints_hinge_viscous_{k + 1}"].values for k in range(3)])
+        assert (runs["status"] == 0).all()
+    middle = 0.01 / np.sqrt(1.01)  # of the lognormal
+    np.testing.assert_allclose(np.exp(np.log(drawn).mean(axis=1)), middle, rtol=0.05)
+    assert len(np.unique(drawn)) == drawn.size
 
 
 def test_what_was_found_goes_once_a_stage_is_run_anew(test_files, found, tmp_path, monkeypatch):
