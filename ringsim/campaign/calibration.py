@@ -68,11 +68,20 @@ class Given:
         return self.budget.runs // self.budget.stages
 
     def require_readings(self) -> None:
-        """Refuse (InputError) a test that is still to come."""
+        """Refuse (InputError) a test that is still to come, or that a prior has learnt from."""
         if self.measurement.file.planned:
             where = f"{self.campaign.file.name}: measured = {self.budget.measured}"
             cure = "ringsim sensors takes it; or give its table as file, and clock.column"
             raise InputError(f"{where}: this test is still to come: {cure}")
+        test = self.measurement.file.name
+        for name, law in self.campaign.specification.inputs.items():
+            learnt = law.data.split(", ") if isinstance(law, Calibrated) else []
+            if test in [each.partition(" ")[0] for each in learnt]:
+                raise InputError(
+                    f"{self.campaign.file.name}: inputs.{name} has learnt from the test {test} "
+                    "already, and its readings would count twice: give the prior from before it, "
+                    f"or, if these are other readings, another name in {self.budget.measured}"
+                )
 
 
 def calibration_of(

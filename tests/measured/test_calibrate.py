@@ -560,9 +560,11 @@ def test_campaign_draws_what_was_found(found, tmp_path):
 
 @pytest.mark.slow
 def test_second_test_begins_where_the_first_ended(found, tmp_path):
-    """Twice the same readings are worth readings of half the variance."""
+    """Twice the same readings are worth readings of half the variance.  By their own name alone
+    they are refused."""
     posterior, folder = found
-    write_test(tmp_path, TRUTH)
+    stand = write_test(tmp_path, TRUTH)
+    stand.write_text(stand.read_text().replace('name = "stand"', 'name = "stand-2"'))
     shutil.copy(folder / POSTERIOR, tmp_path)
     file = write_file(tmp_path, inputs={})
     file.write_text(file.read_text() + '\nfrom = "posterior.nc"\n')
@@ -572,7 +574,26 @@ def test_second_test_begins_where_the_first_ended(found, tmp_path):
         now = second["posterior_quantile"].sel(unknown=name).values
         assert (now[2] - now[0]) / (was[2] - was[0]) == pytest.approx(np.sqrt(0.5), rel=0.06)
         assert now[1] == pytest.approx(was[1], abs=0.1 * (was[2] - was[0]))
-    assert '"data": "stand, stand"' in second.attrs["inputs"]
+    assert '"data": "stand, stand-2"' in second.attrs["inputs"]
+
+
+@pytest.mark.parametrize("mark", ["", " (NOT EXPLAINED: intervals too narrow)", ", later"])
+def test_readings_that_a_prior_has_learnt_from_are_refused(mark, tmp_path):
+    write_test(tmp_path, TRUTH)
+    file = write_file(tmp_path, inputs={})
+    of = table({"kind": "uniform", "low": 97.0, "high": 103.0})
+    prior = f'{{ kind = "calibrated", of = {of}, shift = 0.1, remaining_scatter = 0.5, data = '
+    text = f'{file.read_text()}\n"structure.opening_angle" = {prior}"first, stand{mark}" }}\n'
+    file.write_text(text)
+    for more in (["--dry-run"], ["--out", str(tmp_path / "out")]):
+        told = CliRunner().invoke(cli, ["calibrate", str(file), *more])
+        assert told.exit_code == 2
+        assert (
+            "inputs.structure.opening_angle has learnt from the test stand already" in told.output
+        )
+        assert "another name in stand.toml" in told.output
+    assert not (tmp_path / "out").exists()
+    calibration_of(text.replace("first, stand", "first, stand-0"), file).require_readings()
 
 
 def test_plan_of_sensors_foretells_what_a_test_tells(test_files, found, tmp_path):
