@@ -57,8 +57,8 @@ _FAMILIES = {
     "samples": "close lost may_be_off short unsure used violating without_value",
     "second": "order_index", "separation": "chance", "setting": "first second", "side": "",
     "source": "", "statistic": "",
-    "tail": "agreement checked checked_outside confirmed difference ended levels lost missed "
-            "nearest probability probability_moved reached_probability replicate "
+    "tail": "agreement checked checked_outside confirmed difference ended left_out levels lost "
+            "missed nearest probability probability_moved reached_probability replicate "
             "replicate_probability unled variation variation_of_chains",
     "together": "confidence lost of probability_lower probability_upper", "total": "index",
     "verdict": "may_change of_used", "worst": "failed failure found inputs of sample",
