@@ -87,7 +87,7 @@ class BaseReaction(Output):
 def _jolted_at_start(scene: Scene) -> bool:
     cables = [] if scene.cables is None else scene.cables.present()
     taut = any(cable.initial_slack < 0.0 for _, cable in cables)
-    return taut or any(fault.time <= AT_ONCE for fault in scene.faults)
+    return taut or any(fault.jolts and fault.time <= AT_ONCE for fault in scene.faults)
 
 
 class BaseRotation(Output):
