@@ -13,21 +13,30 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_AT_ONCE = 1 << 16
+"""Numbers that are found at once: half a dozen arrays of all joints of a long ring at all times
+took more memory than its run."""
+
 
 def cubic(times: Array, values: Array, slopes: Array, where: Array) -> Array:
     """The cubics that fit values and slopes, (n, ...), at times (n,), n >= 2, at other times (m,).
 
     Shape (m, ...), in the values' unit; beyond the ends the outermost cubics go on.
     """
-    k = np.clip(np.searchsorted(times, where, side="right") - 1, 0, len(times) - 2)
-    wide = (-1, *[1] * (values.ndim - 1))
-    step = (times[k + 1] - times[k]).reshape(wide)
-    share = (where - times[k]).reshape(wide) / step
-    risen = values[k + 1] - values[k]
-    first, last = slopes[k] * step - risen, slopes[k + 1] * step - risen
-    # The line between both ends, and what bends it: (1 - s) s ((1 - s) first - s last).
-    bent = (1.0 - share) * first - share * last
-    return np.asarray(values[k] + share * risen + share * (1.0 - share) * bent)
+    found = np.empty((len(where), *values.shape[1:]))
+    numbers = np.clip(np.searchsorted(times, where, side="right") - 1, 0, len(times) - 2)
+    wide, rows = (-1, *[1] * (values.ndim - 1)), max(1, _AT_ONCE * len(where) // max(1, found.size))
+    for begin in range(0, len(where), rows):
+        own = slice(begin, begin + rows)
+        k = numbers[own]
+        step = (times[k + 1] - times[k]).reshape(wide)
+        share = (where[own] - times[k]).reshape(wide) / step
+        risen = values[k + 1] - values[k]
+        first, last = slopes[k] * step - risen, slopes[k + 1] * step - risen
+        # The line between both ends, and what bends it: (1 - s) s ((1 - s) first - s last).
+        bent = (1.0 - share) * first - share * last
+        found[own] = values[k] + share * risen + share * (1.0 - share) * bent
+    return found
 
 
 def monotone_slopes(times: Array, values: Array) -> Array:

@@ -50,13 +50,12 @@ class Series:
         Cubic Hermite interpolation with ``rates``, the values' derivatives, else PCHIP.
         """
         found = np.full((len(where), *self.values.shape[1:]), np.nan)
-        inside = where <= self.times[-1] * _SAME
-        found[inside] = self._within(np.minimum(where[inside], self.times[-1]), rates)
+        inside = int(np.searchsorted(where, self.times[-1] * _SAME, side="right"))
+        self._fill(found[:inside], np.minimum(where[:inside], self.times[-1]), rates)
         found[:, ~np.isfinite(self.values).all(axis=0)] = np.nan
         return found
 
-    def _within(self, where: Array, rates: Array | None) -> Array:
-        found = np.empty((len(where), *self.values.shape[1:]))
+    def _fill(self, found: Array, where: Array, rates: Array | None) -> None:
         values = np.nan_to_num(self.values, posinf=0.0, neginf=0.0)
         # Two readings of one time are a jump, which no curve goes through.
         jumps = np.flatnonzero(np.diff(self.times) <= 0.0) + 1
@@ -68,7 +67,6 @@ class Series:
             else:
                 slopes = monotone_slopes(times, known) if rates is None else rates[begin:end]
                 found[own] = cubic(times, known, slopes, where[own])
-        return found
 
 
 def slowest_period(layout: Layout) -> float:
@@ -127,6 +125,12 @@ class Run:
             (np.arange(begin, end), scene)
             for (begin, end), scene in zip(bounds, scenes, strict=True)
         ]
+
+    @cached_property
+    def opening(self) -> Array:
+        """Opening angles at the output times, shape (planes, sections, m), deg."""
+        found = self.angles.on_grid(self.rates.values)
+        return np.degrees(found, out=found)  # in place: most of what a long ring's outputs take
 
     @cached_property
     def history(self) -> History:

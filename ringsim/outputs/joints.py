@@ -38,7 +38,7 @@ class OpeningAngle(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Cubic Hermite interpolation of angles and rates."""
-        return {"opening_angle": np.degrees(run.angles.on_grid(run.rates.values))}
+        return {"opening_angle": run.opening}
 
 
 # How far the V-joints are apart.
@@ -82,7 +82,7 @@ class Asynchrony(Output):
         if not run.scene.structure.locks:
             return {}
         joints = run.locks.size
-        opening = np.degrees(run.angles.on_grid(run.rates.values)).reshape(joints, -1)
+        opening = run.opening.reshape(joints, -1)
         apart = opening.max(axis=0) - opening.min(axis=0)
         angles, rates = (each.values.reshape(-1, joints) for each in (run.angles, run.rates))
         largest = largest_spread(run.angles.times, angles, rates, run.until)
