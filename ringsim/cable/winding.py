@@ -473,13 +473,17 @@ class RampWinding(PrescribedWinding):
 
     def wound(self, time: float) -> float:
         """Rope taken up, in metre."""
-        phase = min(max(time / self.duration, 0.0), 1.0)
+        phase = max(time / self.duration, 0.0)
+        if phase >= 1.0:  # most of a run
+            return self.speed * (0.5 * self.duration + (time - self.duration))
         ramp = sum(c * phase ** (k + 1) / (k + 1) for k, c in enumerate(_RATE[self.shape]))
-        return self.speed * (self.duration * ramp + max(time - self.duration, 0.0))
+        return self.speed * (self.duration * ramp)
 
     def wound_rate(self, time: float) -> float:
         """Its rate, in m/s."""
-        phase = min(max(time / self.duration, 0.0), 1.0)
+        phase = max(time / self.duration, 0.0)
+        if phase >= 1.0:
+            return self.speed
         return self.speed * sum(c * phase**k for k, c in enumerate(_RATE[self.shape]))
 
 
