@@ -57,7 +57,8 @@ def run(
     Raises
     ------
     InputError
-        If the scene asks for stored states, or is to go on from one: only the frame engine can.
+        If the structure cannot be put together, or the scene asks for stored states, or is to go on
+        from one, as only the frame engine can.
     """
     require_fit(start, scene, "full")
     prepare_run(scene)
@@ -74,7 +75,6 @@ def prepare_run(scene: Scene) -> None:
 _CRAWLS = 0.3
 """Excess of a tension from which on friction is not merely rounded: the rope runs slower than the
 slip speed, and the ring opens where its friction would hold it."""
-_REFUSED = InputError, NotBuiltError
 
 
 def run_frame(
@@ -92,12 +92,12 @@ def run_frame(
     from ringsim.frame.integrate import solve
 
     if start is None and scene.record.state_interval is None:
-        return _run(solve, Fidelity.FRAME, scene, watch, _REFUSED)
+        return _run(solve, Fidelity.FRAME, scene, watch)
     from ringsim.frame.integrate import solve_and_store as solve_storing
 
     storing = partial(solve_storing, start=start)
     before = [] if start is None else start.scenes
-    outcome = _run(storing, Fidelity.FRAME, scene, watch, _REFUSED, before)
+    outcome = _run(storing, Fidelity.FRAME, scene, watch, before)
     return outcome if start is None else replace(outcome, began=start.told(scene))
 
 
@@ -138,11 +138,10 @@ def _refuse_other_rods(scene: Scene) -> None:
 @one_thread()
 def _run(
     solve: Solve, fidelity: Fidelity, scene: Scene, watch: Watch | None,
-    refusal: tuple[type[Exception], ...] = (NotBuiltError,),
     before: Sequence[tuple[float, Scene]] = (),
 ) -> Outcome:  # fmt: skip
-    """Run a scene with an engine, which may raise what is a ``refusal``; it had other scenes
-    ``before``, each until a time (s).
+    """Run a scene with an engine, which may refuse it; it had other scenes ``before``, each until a
+    time (s).
     """
     begin = (time.perf_counter(), time.process_time())
     scene = substituted(scene)
@@ -159,15 +158,15 @@ def _run(
             outcome.values["wall_time"] = np.array(time.perf_counter() - begin[0])
             outcome.values["cpu_time"] = np.array(time.process_time() - begin[1])
             return outcome
-        except refusal:
+        except (InputError, NotBuiltError):
             raise
         except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
             traceback.print_exc()  # a campaign keeps it in the sample's log
-            cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
             place = ""
             with contextlib.suppress(Exception):  # a module may be gone meanwhile
                 place = extensions.line_in(extensions.files_of(scene.imports), error)
-            return Outcome(Status.ERROR, f"{type(error).__name__}: {error}{place}", cause=cause)
+            why = f"{type(error).__name__}: {error}{place}"
+            return Outcome(Status.ERROR, why, cause=Cause.EXCEPTION)
 
     def so_solved(solver: Solver) -> Scene:
         return scene.model_copy(update={"solver": solver})

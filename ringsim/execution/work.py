@@ -207,8 +207,9 @@ def solve(solver: Run, base: Scene, sample: int, values: dict[str, Any]) -> Resu
         log, cause = traceback.format_exc(), Cause.MEMORY
     except (Exception, SystemExit) as error:
         status, log = Status.ERROR, traceback.format_exc()
-        reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
+        refused, kind = isinstance(error, InputError), type(error).__name__
+        reason = str(error) if refused else f"{kind}: {error}" if str(error) else kind
+        cause = Cause.REFUSED if refused else Cause.EXCEPTION
     reason, log = plain(" ".join(reason.split())[:1000]), plain(log[-LOG_CHARACTERS:])
     seconds = time.monotonic() - begin
     return Result(

@@ -155,6 +155,8 @@ class Standing:
         try:
             self.model = model = FrameModel(plain.model_copy(update=others))
         except InputError as error:
+            if NOT_HERE not in str(error):
+                raise InputError(f"at {opening:g} deg: {error}") from error
             why = str(error).removeprefix(f"{NOT_HERE} ").removesuffix(f": {CURE}")
             raise InputError(
                 f"modes are those of the frame engine, which does not represent {why}: leave that "

@@ -24,6 +24,7 @@ from ringsim.layout.draft import balanced
 from ringsim.layout.layout import Layout, layout_at_opening
 from ringsim.outputs.corners import deviations
 from ringsim.parts.rods import Rods
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.scene.substituted import substituted
 
@@ -224,9 +225,9 @@ class Frames:
                     return self._moved()
             blocks = np.einsum("nmi,nm,nmj->nij", slopes, self._stiffness, slopes)
             multipliers = self._step(self._summed(blocks, spots), rows, pushed, gaps)
-        raise ValueError(
-            "the structure cannot be put together: with these rods nothing balances near the "
-            "drawing (reduce rods.length_error, structure.hinge_error or structure.angle_error)"
+        raise InputError(
+            "rods.length_error, structure.hinge_error, structure.angle_error: the structure cannot "
+            "be put together, nothing balances near the drawing (reduce them)"
         )
 
     def _step(
@@ -390,7 +391,7 @@ def assembled(layout: Layout, rods: Rods, *, locked: bool = False) -> Assembled:
 
     Raises
     ------
-    ValueError
+    InputError
         If nothing balances near the drawing.
     """
     wrong = any(rod.strain for rod in layout.rods) or any(
@@ -426,7 +427,7 @@ def deployed(scene: Scene) -> Deployed:
 
     Raises
     ------
-    ValueError
+    InputError
         If nothing balances near the drawing.
     """
     scene = substituted(scene)

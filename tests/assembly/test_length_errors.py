@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 from loops import for_each
 
+from ringsim import simulation
+from ringsim.execution import work
 from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.layout.bodies import STEP, Lump, Rod
@@ -19,7 +22,7 @@ from ringsim.parts.rods import LengthError
 from ringsim.refusal import InputError
 from ringsim.rigid.assembling import assembled, deployed, strains
 from ringsim.scene import Scene, load_scene
-from ringsim.variables import Cause
+from ringsim.variables import Cause, Status
 
 NAMES = tuple(LengthError.model_fields)
 
@@ -319,6 +322,20 @@ def test_a_scene_without_errors_is_as_it_was() -> None:
 def test_bad_input_is_refused(scene: str, values: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         load_scene(scene).with_values(values)
+
+
+@pytest.mark.parametrize("solver", ["run", "run_frame"])
+def test_a_ring_that_cannot_be_put_together_is_refused_and_a_sample_is_a_row(solver: str) -> None:
+    """In a line that names the fields: it is the input that is wrong, not the solver."""
+    errors = {"diagonal_rising": 0.01, "diagonal_falling": -0.01}
+    scene = ring(6, structure__opening_angle=179.5)
+    words = r"rods\.length_error, .* cannot be put together"
+    with pytest.raises(InputError, match=f"^{words}"):
+        getattr(simulation, solver)(scene.with_values({"rods.length_error": errors}))
+    values = {f"rods.length_error.{name}": value for name, value in errors.items()}
+    found = work.solve(getattr(simulation, solver), scene, 0, values)
+    assert (found.status, found.cause) == (Status.ERROR, Cause.REFUSED)
+    assert re.match(words, found.reason)
 
 
 @pytest.mark.parametrize("errors", [
