@@ -107,17 +107,28 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
 
 
 def in_order(found: xr.Dataset) -> xr.Dataset:
-    """The samples of a campaign by their numbers, and records by time, however they were selected:
-    what analyses and figures tell of them goes by their places.
+    """The samples of a campaign by their numbers, and records by time, however they were selected
+    or transposed: what analyses and figures tell of them goes by their places.
 
-    InputError if no sample is left.
+    InputError if no sample is left, or one of them, or another place, is there twice.
     """
-    for dim in ("sample", "time"):
-        rising = dim not in found.indexes or found.indexes[dim].is_monotonic_increasing
-        found = found if rising else found.sortby(dim)
+    for dim in (name for name in found.indexes if name in found.dims):
+        index = found.indexes[dim]
+        if not index.is_unique:
+            twice = index[index.duplicated()][0]
+            raise InputError(f"{dim} = {twice} is twice in this selection: select each once")
+        if dim in ("sample", "time") and not index.is_monotonic_increasing:
+            found = found.sortby(dim)
     if found.sizes.get("sample") == 0:
         raise InputError("no sample is left in this selection: select one at least")
-    return found
+    turned = {}
+    for name, each in found.data_vars.items():
+        known = VARIABLES[str(name)].dims if name in VARIABLES else ()
+        order = dict.fromkeys(("sample", *known, *each.dims))
+        wanted = tuple(dim for dim in order if dim in each.dims)
+        if wanted != each.dims:
+            turned[name] = each.transpose(*wanted)
+    return found.assign(turned) if turned else found
 
 
 def as_in_scene(found: xr.Dataset) -> xr.Dataset:

@@ -16,6 +16,7 @@ from ringsim.cable.friction import Frictionless, PulleyFriction
 from ringsim.cable.ropes import Array
 from ringsim.cable.winding import FeedbackWinding, PrescribedWinding, StallWinding, Winding
 from ringsim.choice import OneOf, kind_of
+from ringsim.parts.faults import AT_ONCE
 from ringsim.units import (
     AxialStiffness,
     Metre,
@@ -106,6 +107,10 @@ RESTING = 1e-2
 rest exponentially, never quite, and a ring that just counts as resting takes up 0.7 % on
 ``ring18-motor`` (``ringsim.stepping.ending``)."""
 
+_JUMP = 1e-3
+"""Jump of a prescribed speed over the usual one that counts: a ramp of 0.1 ms changes by less
+within ``AT_ONCE``."""
+
 
 class Winch(Model):
     """A motor with a drum: a winding law between a start and a stop."""
@@ -136,6 +141,16 @@ class Winch(Model):
         if self.stop_time is None:
             return bends
         return [*(time for time in bends if time < self.stop_time), self.stop_time]
+
+    def jumps(self) -> set[float]:
+        """Those at which it starts or stops, or a prescribed speed is another one behind them."""
+        found = {self.start_time} if self.stop_time is None else {self.start_time, self.stop_time}
+        slight = _JUMP * self.winding.usual_speed()
+        for time in self.breaks():
+            rates = [self.at(time, moment=time + side)[1] for side in (-AT_ONCE, AT_ONCE)]
+            if abs(rates[1] - rates[0]) > slight:
+                found.add(time)
+        return found
 
     def turns(self, time: float) -> bool:
         """Whether the motor is switched on at a time (s)."""

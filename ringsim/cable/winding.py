@@ -405,7 +405,9 @@ class MotorWinding(FeedbackWinding):
         free = self.free_speed
         shaft = min(max(speed / self.travel, _LEAST_COMMAND * free), (1.0 - _LEAST_COMMAND) * free)
         if shaft == self.speed:
-            return self
+            if self.ramp is None:
+                return self
+            shaft = math.nextafter(shaft, 0.0)  # or a command of its own speed would not be seen
         return self.model_copy(update={"speed": shaft, "ramp": None})
 
     def commanded_speed(self) -> float:

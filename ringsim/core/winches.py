@@ -288,6 +288,8 @@ class Winches:
                 if turning and isinstance(winch.winding, FeedbackWinding):
                     self._turning[place] = winch.winding
             elif isinstance(self._winches[place].winding, FeedbackWinding):
+                if not self._winches[place].turns(time + AT_ONCE):
+                    rate[place] = 0.0
                 continue
             else:
                 by_law, rate[place] = self._winches[place].at(time, moment=time + AT_ONCE)

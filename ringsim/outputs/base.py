@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -123,23 +122,42 @@ class BaseRotation(Output):
 
 
 def unwound(vectors: Array) -> Array:
-    """Rotation vectors of steps, shape (n, 3), rad, each as near to the one before as whole turns
-    about its own axis bring it: as they are, none is longer than pi.
+    """Rotation vectors of steps, shape (n, 3), rad, with the whole turns that came before: as they
+    are, none is longer than pi.
+
+    The angle is carried on by the turn of each step about the last axis that was well known.  Near
+    a whole turn a body that wobbles has the axis of its wobble, which tells nothing of the turns:
+    there the angle counts along the axis that it had.
     """
-    found = np.array(vectors)
-    for before, now in pairwise(found):
+    from scipy.spatial.transform import Rotation  # here: most runs have no such base
+
+    found, turns = np.array(vectors), Rotation.from_rotvec(vectors)
+    steps = (turns[1:] * turns[:-1].inv()).as_rotvec()
+    axis, angle = np.zeros(3), 0.0
+    for now, step in zip(found[1:], steps, strict=True):
         size = float(np.linalg.norm(now))
-        # What is nearly a whole turn from the start has no axis of its own.
-        axis = (
-            now / size if size > _NO_TURN else before / max(float(np.linalg.norm(before)), 1e-300)
-        )
-        turns = round((float(before @ axis) - float(now @ axis)) / math.tau)
-        now += math.tau * turns * axis
+        own = now / size if size > _NO_TURN else axis
+        if own @ axis < 0.0:
+            own, size = -own, -size
+        known = abs(math.sin(0.5 * size)) > _KNOWN
+        if not known and own @ axis < _ALIKE:
+            own, size = axis, float(now @ axis)
+        angle += float(step @ axis)
+        whole = math.tau * round((angle - size) / math.tau)
+        if whole:
+            now[:] = (size + whole) * own
+        if known:
+            axis, angle = own, size + whole
     return found
 
 
 _NO_TURN = 1e-9
 """Rotation whose axis is round-off, rad."""
+_KNOWN = 0.7
+"""Sine of half a rotation, of a right angle, from which on its axis is well known: whoever wobbles
+by less than 30 deg does not turn it round."""
+_ALIKE = 0.9
+"""Cosine between two axes that are taken for the same one, which wanders."""
 
 
 class BaseRate(Output):

@@ -287,10 +287,11 @@ def _motors(
                     held = float(np.nan_to_num(run.held[plane].max(), nan=math.inf))
                 later = times[steps] > held + AT_ONCE
                 early = steps[~later]
-                # Until its first command a motor follows its own law.
+                # Until its first command a motor follows its own law, from then on the last one,
+                # whether the scene that it goes on with has a controller or not.
                 told = series.values[early, plane, end, _COMMAND]
                 own = np.flatnonzero(told != motor.commanded_speed())
-                first = int(own[0]) if scene.controller is not None and own.size else len(early)
+                first = int(own[0]) if own.size else len(early)
                 for part, commanded in ((early[:first], False), (early[first:], True)):
                     if part.size:
                         yield part, place, winch, motor, commanded

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 class Events:
     """The events of a scene; ``times`` are increasing, s, and at ``switches`` winches start or
-    stop.
+    stop, or their speeds jump.
     """
 
     def __init__(self, scene: "Scene") -> None:
@@ -48,9 +48,7 @@ class Events:
         """
         cables = () if scene.cables is None else (cable for _, cable in scene.cables.present())
         winches = [winch for cable in cables for winch in cable.winches]
-        self.switches = {one.start_time for one in winches} | {
-            one.stop_time for one in winches if one.stop_time is not None
-        }
+        self.switches = {time for winch in winches for time in winch.jumps()}
         found = {fault.time for fault in scene.faults} | {scene.loads_turn_at} - {math.inf}
         found.update(time for winch in winches for time in winch.breaks())
         self.times = sorted(time for time in found if time > AT_ONCE)

@@ -259,6 +259,9 @@ def test_without_its_sample_nothing_is_the_base_case(cases: xr.Dataset) -> None:
         ({"plane": [1]}, "plane is only lower in"),
         ({"span": slice(2, 5)}, "span is only 3, 4, 5 in"),
         ({"time": 3}, "time is only 1.5 in .*must be a dimension"),
+        ({"sample": [0, 1, 1, 2]}, "sample = 1 is twice in this selection: select each once"),
+        ({"time": [0, 1, 1]}, "time = .* is twice"),
+        ({"section": [0, 0, 1, 2, 3]}, "section = 1 is twice"),
     ],
 )
 def test_selections_are_refused_that_lack_a_part_of_the_ring(
@@ -272,6 +275,18 @@ def test_selections_are_refused_that_lack_a_part_of_the_ring(
         for ask in ("leader", "plot"):
             with pytest.raises(InputError, match=told):
                 getattr(part.isel(sample=0, drop=True).ring, ask)()
+
+
+def test_dimensions_may_come_in_any_order(campaign: xr.Dataset) -> None:
+    """What is told and drawn goes by their places, which a transposed dataset has otherwise."""
+    turned = campaign.transpose()
+    assert turned["opening_angle"].dims[0] == "time"
+    for name, rows in campaign.ring.tables().items():
+        assert turned.ring.tables()[name].equals(rows)
+    xr.testing.assert_equal(turned.ring.fan(), campaign.ring.fan())
+    for whole, other in ((campaign, turned), (campaign.isel(sample=3), turned.isel(sample=3))):
+        figures = whole.ring.plot(), other.ring.plot()
+        assert len(figures[0]) == len(figures[1]) > 0
 
 
 def test_planes_and_sections_may_be_turned(campaign: xr.Dataset) -> None:

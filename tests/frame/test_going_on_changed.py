@@ -132,3 +132,31 @@ def test_constant_steps_behind_a_state_are_not_judged_as_from_rest(tmp_path: Pat
     constant = scene.with_values({"solver.step_control": "constant", "solver.step": 0.005})
     found = simulate(constant, start=read_state(tmp_path / "run.nc", 1.25))
     assert "fewer than" not in found.attrs["reason"]
+
+
+MOTOR = {"kind": "motor", "no_load_speed": 60.0, "stall_torque": 1.0, "drum_radius": 0.01}
+
+
+def motors(**values: Any) -> dict[str, Any]:
+    return {f"cables.{plane}.winch.winding": MOTOR | values for plane in ("upper", "lower")}
+
+
+def test_a_motor_keeps_the_last_command_of_a_controller_that_is_gone(tmp_path: Path) -> None:
+    """Its rope and its shaft: what it gives is the rope's work, and it lags behind nothing else."""
+    told = {"kind": "synchronise", "speed": 0.05, "gain": 0.0, "period": 0.5}
+    given = motors(speed=40.0, rotor_inertia=1e-6) | {"controller": told, "record.interval": 0.01}
+    found = gone_on(tmp_path, given, {"controller": "none"})
+    later = found.sel(time=slice(2.1, None))
+    np.testing.assert_allclose(later["motor_speed"], 5.0, rtol=1e-3)
+    tension = found["cable_tension"].isel(span=0).sel(time=slice(2.1, None))
+    np.testing.assert_allclose(later["motor_torque"].sel(winch=1), 0.01 * tension, rtol=1e-3)
+
+
+@pytest.mark.parametrize("change", ["stop_time", "start_time"])
+def test_a_motor_that_a_change_switches_off_stands_at_once(change: str, tmp_path: Path) -> None:
+    given = motors(speed=20.0) | {"record.interval": 0.01}
+    time = {"stop_time": 1.0, "start_time": 2.5}[change]
+    found = gone_on(tmp_path, given, {f"cables.upper.winch.{change}": time})
+    speed = found["motor_speed"].sel(plane="upper", winch=1)
+    assert speed.sel(time=1.99, method="nearest").item() > 1.0
+    assert np.abs(speed.sel(time=[2.0, 2.01], method="nearest")).max() == 0.0

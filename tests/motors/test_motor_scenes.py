@@ -329,6 +329,22 @@ def test_a_command_that_changes_asks_for_nothing_before_it() -> None:
     assert given == pytest.approx(work / 0.6 + kept, rel=0.02)
 
 
+def test_a_command_of_its_own_speed_ends_the_ramp_of_a_motor() -> None:
+    """As one of nearly its own speed does."""
+    ramped, planes = MOTOR | {"speed": 100.0, "ramp": 1.0}, ("upper", "lower")
+    values = {f"cables.{plane}.winch.winding": ramped for plane in planes}
+    scene = ring(structure__sections=3, solver__end_time=0.4).with_values(values)
+    speeds = []
+    for told in (100.0, 100.0 * (1.0 - 1e-9)):
+        run = steps(scene, period=0.1)
+        for number, _ in enumerate(run):
+            if number == 1:
+                run.command(**dict.fromkeys(planes, TRAVEL * told))
+        speeds.append(run.result["motor_speed"].sel(time=[0.15, 0.3], method="nearest").values)
+    np.testing.assert_allclose(speeds[0], speeds[1], rtol=1e-6)
+    assert speeds[0][0, 0].min() > 50.0
+
+
 def test_a_ramp_takes_the_jump_from_the_first_steps() -> None:
     peaks = {}
     for ramp in (None, 0.5):
