@@ -1,6 +1,7 @@
 """Files: texts and TOML with refusals of one line, and files that appear whole or not at all."""
 
 import contextlib
+import errno
 import glob
 import os
 import re
@@ -177,9 +178,13 @@ def writing(path: Path, cure: str = "free some space or choose another folder") 
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         left = getattr(error, "__notes__", [_short(path)])[0]
+        if left.startswith(_FULL):
+            reason = os.strerror(errno.ENOSPC)
         raise InputError(f"{path}: cannot be written: {reason}{left}; {cure}") from error
 
 
+_FULL = ", 0 B "
+"""How ``_short`` begins of a full disk."""
 _LITTLE_LEFT = 100e6
 """Bytes: a campaign of some hundred samples; where more is left, that is hardly the cause."""
 

@@ -201,7 +201,8 @@ class Variable:
     least_of: str = ""
     """Variable with dimensions whose smallest value this number is."""
     round_off: float = 0.0
-    """Difference of two engines' values that is none, whatever their error bars."""
+    """Difference of two engines' values that is none, whatever their error bars; half of it counts
+    as 0 in campaigns."""
 
     @property
     def badness(self) -> int:

@@ -507,10 +507,9 @@ class Twins:
 
 def _equal(first: Array, second: Array) -> bool:
     """Cheaply if they are not, as most differ in the first few."""
-    few = slice(0, 8)
     return all(
         np.allclose(first[part], second[part], rtol=1e-9, atol=0.0, equal_nan=True)
-        for part in (few, slice(None))
+        for part in (slice(0, 8), slice(None))
     )
 
 
@@ -532,10 +531,11 @@ def numbers(campaign: xr.Dataset, name: str) -> Array:
     if name not in campaign:
         return np.full(campaign.sizes["sample"], np.nan)
     values = campaign.variables[name].to_numpy().astype(float)
-    known = quantities().get(name.removesuffix(CHECKED))
-    # Missing counts are negative.
-    counts = known is not None and known.dtype.startswith("i")
-    return np.where(values < 0, np.nan, values) if counts else values
+    if (known := quantities().get(name.removesuffix(CHECKED))) is None:
+        return values
+    if known.dtype.startswith("i"):  # missing counts are negative
+        return np.where(values < 0, np.nan, values)
+    return np.where(np.abs(values) < 0.5 * known.round_off, 0.0, values)
 
 
 def good(campaign: xr.Dataset) -> Mask:

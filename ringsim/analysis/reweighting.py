@@ -418,12 +418,13 @@ def _check_cover(path: str, old: Distribution, new: Distribution, samples: int) 
         (tail, max(_BEYOND_SAMPLES, 2 / samples), f"where hardly any of {samples} samples lie"),
     ):
         low, high = old.quantile(inside(np.array([part, 1 - part]))).tolist()
+        low *= abs(low) > 1e-12 * abs(high)  # a bound of 0, of which it is a hair inside
         beyond = new.probability(low) + 1 - new.probability(high)
         if beyond > most:
             raise InputError(
-                f"--reweight {path}: {beyond:.2g} of the new distribution lies below {low:.4g} "
-                f"or above {high:.4g}, {words}; at most {most:.2g} is allowed: choose a narrower "
-                "distribution, or run a campaign with it"
+                f"--reweight {path}: {100 * beyond:.2g} % of the new distribution lie below "
+                f"{low:.4g} or above {high:.4g}, {words}; at most {100 * most:.2g} % are allowed: "
+                "choose a narrower distribution, or run a campaign with it"
             )
 
 

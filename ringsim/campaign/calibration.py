@@ -236,10 +236,12 @@ class _Course:
                 outputs=asked.outputs,
             )  # fmt: skip
         except InputError as error:
-            cure = "truncate the prior that gives it"
+            cure = ": truncate the prior that gives it"
             if str(self.folder) in str(error):
-                cure = f"choose another folder with --out, or delete {name} and later stages"
-            raise InputError(f"{given.campaign.file.name}: {title}: {error}: {cure}") from None
+                cure = f": choose another folder with --out, or delete {name} and later stages"
+            if isinstance(error.__cause__, OSError | RuntimeError):  # of a full disk it is told
+                cure = ""
+            raise InputError(f"{given.campaign.file.name}: {title}: {error}{cure}") from None
         if held < given.members:
             # What an earlier call has found is not what this one finds.
             (self.folder / (SENSORS if self.planning else POSTERIOR)).unlink(missing_ok=True)

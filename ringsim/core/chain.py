@@ -21,7 +21,11 @@ from ringsim.core.tension import (
     Spans,
     with_law_slopes,
 )
+from ringsim.refusal import InputError
 
+_MOST_STRETCHED = 0.5
+"""Share of its path by which a rope may be shorter at the start: a strain of 1, the largest that
+``limits.rope_strain`` allows."""
 _LEAST_SLOPE = 1e-300
 """A slope that counts and changes nothing, s/m."""
 
@@ -82,13 +86,22 @@ class Chain:
         """One rope per cable, as long as its path at the start plus its initial slack.
 
         The points are those of all cables behind one another, in metre, shape (points, 3).
+        InputError if a rope would begin with more than twice its length.
         """
         spans = np.asarray(self._points_per_cable) - 1
         content = np.array([cable.initial_slack for cable in self.cables])
         alive = np.ones(len(spans), dtype=bool)
         ropes = Ropes(self._points_per_cable, np.cumsum(spans) - spans, content, alive)
         lengths = np.linalg.norm(points[ropes.near + 1] - points[ropes.near], axis=1)
-        return replace(ropes, content=ropes.along(lengths) + content)
+        paths = ropes.along(lengths)
+        for number, (path, slack) in enumerate(zip(paths.tolist(), content.tolist(), strict=True)):
+            if slack <= -path * _MOST_STRETCHED:
+                raise InputError(
+                    f"cable {number + 1}: initial_slack = {slack:g} m must be above "
+                    f"{-path * _MOST_STRETCHED:.4g} m, half of its path of {path:.4g} m: it would "
+                    "begin with more than twice its length (raise it)"
+                )
+        return replace(ropes, content=paths + content)
 
     def state(
         self, ropes: Ropes, points: Array, velocities: Array, wound: Array, wound_rate: Array

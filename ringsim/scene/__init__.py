@@ -56,7 +56,7 @@ class Scene(Model):
     """Modules with kinds of your own: files or packages beside this file, or installed ones."""
     structure: Annotated[Structure, OneOf(default="pantograph-ring")] = PantographRing()
     """What deploys."""
-    rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
+    rods: Annotated[Rods, OneOf(default="geometrically-exact")] = GeometricallyExactRods()
     """Material, cross-sections and beam formulation of all rods."""
     joints: Joints = Joints()
     """Friction in pivots, hinges and V-joints."""

@@ -104,6 +104,8 @@ class RunControl(Remembering):
         self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
         self.goes_on = True
         self._watch()
+        if locks is not None:
+            self._note_strain(locks, start.stretch)
 
     @property
     def settled(self) -> bool:

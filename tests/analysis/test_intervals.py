@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made import points, response
+from made import campaign, points, response
 from ringsim.analysis import indices, intervals
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import samples_needed, share_bounds, share_interval
@@ -129,6 +129,16 @@ def test_designs_without_a_population_have_no_intervals(kind):
 def test_values_that_are_all_alike_have_an_interval_of_no_length():
     low, high = intervals.of_independent(np.full((2, 20), 3.0), np.mean)
     assert low.tolist() == high.tolist() == [3.0, 3.0]
+
+
+def test_round_off_is_no_spread() -> None:
+    """Sections that are all alike run apart by it: the same in all samples; as soon as one of them
+    is told as more than 0.0000 deg, they differ.
+    """
+    noise = 1e-11 * np.random.default_rng(5).random(40)
+    assert intervals.numbers(campaign(noise), "asynchrony_max").tolist() == 40 * [0.0]
+    assert not intervals.varies(campaign(noise), "asynchrony_max")
+    assert intervals.varies(campaign(np.append(noise, 1e-4)), "asynchrony_max")
 
 
 def test_few_samples_have_no_interval():

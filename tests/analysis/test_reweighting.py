@@ -293,7 +293,10 @@ def test_words_and_lists_of_places_have_weights():
     [
         ({"x3": NARROW}, "is not a drawn input of this campaign"),
         ({"x1": NARROW | {"standard_deviation": 0.3}}, "where no value was drawn"),
-        ({"x1": {"kind": "uniform", "low": 0.5, "high": 1.5}}, "0.5 of the new distribution"),
+        (
+            {"x1": {"kind": "uniform", "low": 0.5, "high": 1.5}},
+            "50 % of the new distribution lie below 0 or above 1",
+        ),
         (
             {"x1": {"kind": "uniform", "low": 0.5, "high": 0.51}},
             "effective ones, and at least 10 are needed",

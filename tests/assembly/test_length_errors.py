@@ -324,6 +324,28 @@ def test_bad_input_is_refused(scene: str, values: dict[str, Any], words: str) ->
         load_scene(scene).with_values(values)
 
 
+@pytest.mark.parametrize(("diameter", "times"), [(0.1, 1.0), (0.012, 8e3), (0.1, 8e3)])
+def test_the_stiffest_rods_are_put_together_as_all_others(diameter: float, times: float) -> None:
+    """Where round-off is more than any force of small tubes: the same shape, and an energy that
+    goes with the stiffness.
+    """
+    rng, tube = (
+        np.random.default_rng(4),
+        {"outer_diameter": diameter, "inner_diameter": 0.9 * diameter},
+    )
+    errors = {name: (1e-5 * rng.standard_normal(18)).tolist() for name in NAMES}
+    young = float(load_scene("ring18").rods.young_modulus)
+    found = []
+    for modulus in (young, times * young):
+        scene = ring(18, rods__diagonal=tube, rods__bar=tube, rods__young_modulus=modulus)
+        scene = scene.with_values({"rods.length_error": errors})
+        found.append(assembled(layout_of(scene), scene.rods))
+    (first, energy), (second, larger) = found
+    assert larger == pytest.approx(times * energy, rel=1e-6)
+    for one, other in zip(first.bodies, second.bodies, strict=True):
+        np.testing.assert_allclose(one.pose.place, other.pose.place, atol=1e-9)
+
+
 @pytest.mark.parametrize("solver", ["run", "run_frame"])
 def test_a_ring_that_cannot_be_put_together_is_refused_and_a_sample_is_a_row(solver: str) -> None:
     """In a line that names the fields: it is the input that is wrong, not the solver."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from ringsim.frame.model import FrameModel
+from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES, simulate
 from ringsim.variables import Fate, Status
@@ -43,3 +45,17 @@ def test_a_winch_that_pulls_at_a_jam_ends_the_run_where_the_rope_would_break(
     strain = run.peak_tension.item() / 1e5
     length = wound * (1.0 + strain) / strain
     assert length == pytest.approx(scene.cables.winch_distance, rel=0.01)
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_a_rope_that_is_too_short_from_the_start_ends_the_run_there(fidelity: str) -> None:
+    """By its own name, though nothing has moved; one of half its path is refused."""
+    scene = load_scene("truss2")
+    path = float(FrameModel(scene).cables.ropes.content[0])
+    run = simulate(scene.with_values({"cables.upper.initial_slack": -0.3 * path}), fidelity)
+    assert (int(run.status), int(run.outcome)) == (Status.OK, Fate.OVERLOADED)
+    assert run.attrs["reason"].startswith("a rope was strained by 42.9 % at 0 s, more than")
+    assert run.rope_strain.sel(plane="upper").values[0] == pytest.approx(3.0 / 7.0, rel=1e-6)
+    too_short = {"cables.upper.initial_slack": -0.51 * path}
+    with pytest.raises(InputError, match=r"^cable 1: initial_slack = .* half of its path"):
+        simulate(scene.with_values(too_short), fidelity)

@@ -176,7 +176,6 @@ KINDS = [
     _scene("unknown structure", 'structure.kind = "hexapod"', "structure.kind", "pantograph-ring"),
     _scene("unknown rods", 'rods.kind = "rigd"', 'rods.kind = "rigd"', "geometrically-exact"),
     _scene("misspelt rods", 'rods.kind = "acnf"', "rods.kind", "did you mean ancf?"),
-    _scene("no kind of rods", "rods.elements = 2", "rods.kind is missing", '"ancf" or'),
     _scene("no kind of boom", "boom.length = 0.9", "boom.kind is missing", '"flexible" or "rigid"'),
     _scene("kind as number", "rods.kind = 3", "rods.kind = 3", "ancf"),
     _scene("kind as list", 'rods.kind = ["ancf"]', "rods.kind", "did you mean ancf?"),
