@@ -19,7 +19,7 @@ from ringsim.choice import OneOf, kinds_of
 from ringsim.measured import Measured
 from ringsim.overrides import place_of
 from ringsim.reference.keys import Key, keys_of, kind_in, words_of
-from ringsim.refusal import InputError, known_or_nearest
+from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene
 from ringsim.units import LEFT_OUT, Model
 
@@ -134,13 +134,13 @@ def known(path: str, others: list[str]) -> list[Found]:
     near = ends[:2] or difflib.get_close_matches(plain, ROOTS, n=1, cutoff=0.7)
     near = near or (_told_of(plain)[:3] if len(plain) > 2 else [])
     near = near or difflib.get_close_matches(plain, [*others, *every], n=1, cutoff=0.6)
-    near = near or [name for name in others if name.startswith(plain)][:3]
+    near = near or [name for name in others if plain and name.startswith(plain)][:3]
     hint = (
         f"did you mean {' or '.join(near)}?" if near else
         f"ringsim explain lists the variables, ringsim explain {', '.join(ROOTS)} the keys"
     )  # fmt: skip
     raise InputError(
-        f"{path}: neither a key of a file nor a variable of a result ({hint}); a "
+        f"{path or show(path)}: neither a key of a file nor a variable of a result ({hint}); a "
         "campaign's own outputs are told in its file, under [outputs]"
     )
 
