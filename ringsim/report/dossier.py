@@ -550,7 +550,8 @@ _CARRIED = f'boom.base = "fixed" or [spacecraft], {_REACTIONS}'
 """Nothing carries a ring whose base is free and has no spacecraft."""
 for _clause, _asks, _cures in (
     ("4.4.2 Mechanism function", "The motion over time, and its tolerances.",
-     {"deployment_time": "no sample has deployed", "asynchrony_max": "sound runs of a ring with V-joints"}),
+     {"deployment_time": "no sample has deployed",
+      "asynchrony_max": "sound runs of a ring with V-joints"}),
     ("4.7.5.2.2, 4.8.2.12 Loads", "Loads and motion of the spacecraft from the dynamics.",
      {"peak_base_force": _CARRIED, "peak_base_torque": _CARRIED,
       "base_rotation_max": f'boom.base = "free", {_REACTIONS}',

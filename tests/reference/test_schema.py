@@ -88,7 +88,8 @@ BAD_SCENES = [
     ("rods/density", 1e6),
     ("cables/upper/friction/coefficient", {"section 6 V": 0.002}),
     ("solver", "none"),
-    ("rods", {"elements": 2}),  # of no kind
+    ("boom", {"length": 0.9}),  # of no kind
+    ("rods", {"elements": 2}),  # of the default kind
 ]
 
 
