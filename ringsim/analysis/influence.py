@@ -21,15 +21,7 @@ from ringsim.analysis.design import (
     short_of_goal,
 )
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
-from ringsim.analysis.intervals import (
-    Mask,
-    good,
-    lost,
-    numbers,
-    quantities,
-    used,
-    varies,
-)
+from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used, varies
 from ringsim.analysis.requirements import Requirement, violations, without_twins
 from ringsim.analysis.tails import subset_simulation
 from ringsim.refusal import InputError

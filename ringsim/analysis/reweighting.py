@@ -39,13 +39,7 @@ from ringsim.analysis.requirements import OUTCOME, Requirement, looked_at, rule_
 from ringsim.analysis.verdicts import Verdict, verdict_of
 from ringsim.overrides import parse_value
 from ringsim.refusal import InputError, explain, known_or_nearest, show
-from ringsim.sampling.distributions import (
-    Calibrated,
-    Discrete,
-    Distribution,
-    Values,
-    inside,
-)
+from ringsim.sampling.distributions import Calibrated, Discrete, Distribution, Values, inside
 from ringsim.sampling.table import AnyDistribution
 from ringsim.stepping.instant import Array
 from ringsim.units import Model

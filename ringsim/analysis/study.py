@@ -64,13 +64,7 @@ from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import rarer, sensitivity
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge
-from ringsim.analysis.worst import (
-    labels,
-    margins,
-    one_at_a_time,
-    other_than_base,
-    worst,
-)
+from ringsim.analysis.worst import labels, margins, one_at_a_time, other_than_base, worst
 from ringsim.choice import kind_of
 from ringsim.dataset import in_order
 from ringsim.files import parse_toml, read_text

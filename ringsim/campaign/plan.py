@@ -20,14 +20,7 @@ from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.analysis.design import placement_of
 from ringsim.analysis.intervals import quantities, samples_needed
 from ringsim.analysis.requirements import Requirement, doubt_of
-from ringsim.campaign.folder import (
-    FAILED,
-    Folder,
-    digests,
-    open_folder,
-    opened_as,
-    other_build,
-)
+from ringsim.campaign.folder import FAILED, Folder, digests, open_folder, opened_as, other_build
 from ringsim.campaign.merging import is_behind
 from ringsim.campaign.run import Order, grown, growth_told
 from ringsim.campaign.watch import End, decided, looks_of, named

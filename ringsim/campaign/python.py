@@ -21,14 +21,7 @@ from ringsim.analysis.engines import too_far
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.merging import is_behind, merge
 from ringsim.campaign.plan import plan
-from ringsim.campaign.run import (
-    Choices,
-    Order,
-    Share,
-    require_no_launcher,
-    run_campaign,
-    start,
-)
+from ringsim.campaign.run import Choices, Order, Share, require_no_launcher, run_campaign, start
 from ringsim.campaign.specification import campaign_of, load_campaign
 from ringsim.choice import kind_of
 from ringsim.execution.child import end_with
@@ -36,13 +29,7 @@ from ringsim.execution.mpi import launched_size
 from ringsim.execution.slot import Local, without_mpi
 from ringsim.files import MERGED
 from ringsim.overrides import flat
-from ringsim.refusal import (
-    EXIT_BAD_INPUT,
-    EXIT_DONE,
-    EXIT_FAILED,
-    EXIT_INTERRUPTED,
-    InputError,
-)
+from ringsim.refusal import EXIT_BAD_INPUT, EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED, InputError
 from ringsim.sampling.distributions import label_of
 from ringsim.scene import Scene
 from ringsim.units import Model

@@ -31,13 +31,7 @@ from ringsim.campaign.folder import (
 )
 from ringsim.campaign.merging import merge
 from ringsim.campaign.specification import SOLVERS, Campaign, campaign_of, load_campaign
-from ringsim.campaign.watch import (
-    Progress,
-    StopRequest,
-    Watch,
-    as_decided,
-    stopping_on_signals,
-)
+from ringsim.campaign.watch import Progress, StopRequest, Watch, as_decided, stopping_on_signals
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.slot import Local, Serial
 from ringsim.execution.work import (

@@ -305,12 +305,7 @@ def optimise_command(
     interrupted; under mpiexec or srun every rank computes, and --workers is left out.
     """
     from ringsim.analysis.front import front_tables
-    from ringsim.campaign.optimisation import (
-        Given,
-        first_order,
-        optimisation_of,
-        run_optimisation,
-    )
+    from ringsim.campaign.optimisation import Given, first_order, optimisation_of, run_optimisation
 
     def given() -> Given:
         found = optimisation_of(read_text(file), file, settings)

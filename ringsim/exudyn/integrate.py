@@ -12,10 +12,7 @@ from ringsim.cable.chain import ChainState
 from ringsim.exudyn.assembly import STIFFENING, Predictor
 from ringsim.exudyn.build import Built, build
 from ringsim.exudyn.laws import AngleForces
-from ringsim.exudyn.meters import (
-    EnergyMeter,
-    FullMeters,
-)
+from ringsim.exudyn.meters import EnergyMeter, FullMeters
 from ringsim.exudyn.model import Openings, State, joint_groups
 from ringsim.layout.layout import Layout
 from ringsim.outputs.meters import Reading

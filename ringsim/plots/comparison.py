@@ -11,12 +11,7 @@ from matplotlib.ticker import PercentFormatter
 from ringsim.analysis.comparison import paired, samples_of
 from ringsim.analysis.comparison_text import below_a_thousandth, differing, doubtful, names_of
 from ringsim.analysis.courses import blocks, deployed, names_of_ends
-from ringsim.analysis.design import (
-    endings,
-    judged_by,
-    median_and_worst,
-    values_of,
-)
+from ringsim.analysis.design import endings, judged_by, median_and_worst, values_of
 from ringsim.analysis.intervals import ALIKE, good, hardly_apart, numbers, tells_of, used
 from ringsim.analysis.posterior import UNEXPLAINED
 from ringsim.analysis.residuals import BAND, Residuals

@@ -11,13 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import blocks, ends, names_of_ends
-from ringsim.analysis.design import (
-    by_path,
-    endings,
-    judged_by,
-    told,
-    values_of,
-)
+from ringsim.analysis.design import by_path, endings, judged_by, told, values_of
 from ringsim.analysis.intervals import good, used
 from ringsim.analysis.requirements import MARGINS, required_by
 from ringsim.outputs.family import VARIABLES, Array

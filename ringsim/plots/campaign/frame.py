@@ -13,14 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from ringsim.analysis.campaign_notes import (
-    MARK,
-    NOTE,
-    attributes,
-    doubted,
-    off_counts,
-    off_note,
-)
+from ringsim.analysis.campaign_notes import MARK, NOTE, attributes, doubted, off_counts, off_note
 from ringsim.analysis.courses import QUANTILES, ends
 from ringsim.analysis.design import (
     by_path,
