@@ -13,7 +13,6 @@ from typing import Any
 import matplotlib
 import numpy as np
 import xarray as xr
-from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -119,24 +118,29 @@ def write(figure: Figure, path: Path) -> None:
     """Write a file of the kind that its name tells: png, svg or pdf; whole, or not at all."""
     with whole(path, lasting=False) as draft:
         if path.suffix == ".png":
-            _write_png(figure, draft)
+            # As ``savefig``, which draws a figure twice that has a layout to find.
+            with _laid_out(figure, matplotlib.rcParams["savefig.dpi"]):
+                figure.savefig(draft, format="png")
         else:
             figure.savefig(draft, format=path.suffix[1:])
 
 
-def _write_png(figure: Figure, path: Path) -> None:
-    """As ``savefig``, which draws a figure twice that has a layout to find: found before, once."""
+@contextmanager
+def _laid_out(figure: Figure, dpi: float) -> Iterator[None]:
+    """A figure at a resolution with the layout that it needs there, found once, which costs as much
+    as drawing it twice: words have other widths in lines, and at each resolution.
+    """
     engine, before = figure.get_layout_engine(), figure.dpi
+    figure.set_dpi(dpi)
     if engine is not None:
-        figure.set_dpi(matplotlib.rcParams["savefig.dpi"])
         engine.execute(figure)
         figure.set_layout_engine("none")
     try:
-        figure.savefig(path, format="png")
+        yield
     finally:
-        if engine is not None:
+        if engine is not None:  # None would be that of the style
             figure.set_layout_engine(engine)
-            figure.set_dpi(before)
+        figure.set_dpi(before)
 
 
 # Figures as text and bytes: as a notebook shows them, and as elements of an HTML page, SVG where
@@ -180,30 +184,12 @@ class Inline:
             return self._picture
         return self._lines
 
-    @contextmanager
-    def _placed(self, canvas: FigureCanvasBase, dpi: float) -> Iterator[Any]:
-        """The figure's canvas with the layout that it needs itself, found once, which costs as much
-        as drawing it twice: words have other widths in lines, and at each resolution.
-        """
-        engine = self._figure.get_layout_engine()
-        self._figure.set_dpi(dpi)
-        if engine is not None:
-            engine.execute(self._figure)
-            self._figure.set_layout_engine("none")
-        try:
-            yield canvas
-        finally:
-            if engine is not None:  # None would be that of the style
-                self._figure.set_layout_engine(engine)
-
     @cached_property
     @style.styled
     def _lines(self) -> str:
         held, name = io.StringIO(), self._name
-        with (
-            matplotlib.rc_context({"svg.hashsalt": name}),
-            self._placed(FigureCanvasSVG(self._figure), _SVG_DPI) as canvas,
-        ):
+        canvas: Any = FigureCanvasSVG(self._figure)
+        with matplotlib.rc_context({"svg.hashsalt": name}), _laid_out(self._figure, _SVG_DPI):
             # By the canvas itself: savefig draws a figure twice that had a layout to find.
             self._figure.set_dpi(matplotlib.rcParams["savefig.dpi"])
             canvas.print_svg(held, metadata={"Date": None})
@@ -220,9 +206,10 @@ class Inline:
     @cached_property
     @style.styled
     def _picture(self) -> str:
-        with self._placed(FigureCanvasAgg(self._figure), _DPI) as canvas:
+        canvas: Any = FigureCanvasAgg(self._figure)
+        with _laid_out(self._figure, _DPI):
             canvas.draw()
-        drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+            drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         # 256 colours are a third of the bytes, and nobody sees a difference.
         few, picture = drawn.quantize(dither=Image.Dither.NONE), io.BytesIO()
         few.save(picture, format="png")  # optimised it takes ten times as long for 8 % less
