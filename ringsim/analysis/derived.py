@@ -292,26 +292,11 @@ def of_run(
 # What an expression may be made of: the same walk tells dimensions and unit, and computes.
 
 
-def _largest(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
-    return values.max(dims) if dims else values
-
-
-def _smallest(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
-    return values.min(dims) if dims else values
-
-
-def _where(largest: Callable[..., xr.DataArray]) -> Callable[..., xr.DataArray]:
-    """Coordinate of the largest or smallest value along one dimension, the others reduced first."""
-
-    def place(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
-        (dim,) = dims
-        others = [str(d) for d in values.dims if d not in (dim, "sample")]
-        values = largest(values, others)
-        found = values.fillna(-np.inf if largest is _largest else np.inf)
-        found = found.idxmax(dim) if largest is _largest else found.idxmin(dim)
-        return found.where(values.notnull().any(dim))
-
-    return place
+def _place_of_largest(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
+    """Coordinate of the largest value along one dimension, the others reduced first."""
+    (dim,) = dims
+    values = values.max([d for d in values.dims if d not in (dim, "sample")])
+    return values.fillna(-np.inf).idxmax(dim).where(values.notnull().any(dim))
 
 
 def _integral(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
@@ -323,13 +308,13 @@ def _integral(values: xr.DataArray, dims: list[str]) -> xr.DataArray:
 
 
 _REDUCTIONS: dict[str, Callable[[xr.DataArray, list[str]], xr.DataArray]] = {
-    "max": _largest,
-    "min": _smallest,
+    "max": lambda values, dims: values.max(dims),
+    "min": lambda values, dims: values.min(dims),
     "mean": lambda values, dims: values.mean(dims),
     "sum": lambda values, dims: values.sum(dims, min_count=1),
     "difference": lambda values, dims: values.max(dims) - values.min(dims),
-    "argmax": _where(_largest),
-    "argmin": _where(_smallest),
+    "argmax": _place_of_largest,
+    "argmin": lambda values, dims: _place_of_largest(-values, dims),
     "integral": _integral,
 }
 """Functions that take one number of many, over all dimensions or those that ``over`` names."""
