@@ -262,6 +262,16 @@ def with_unit(number: str, units: str) -> str:
     return f"{number} {unit_text(units)}".rstrip()
 
 
+def amount_text(value: float, units: str, form: str = ".3g") -> str:
+    """A value of an SI unit in the unit in which people read it.
+
+    >>> amount_text(3.018e7, "Pa"), amount_text(3.018e7, "Pa", "+.4g"), amount_text(0.25, "1")
+    ('30.2 MPa', '+30.18 MPa', '0.25')
+    """
+    factor, unit = readable(units, value)
+    return f"{factor * value:{form}} {unit_text(unit)}".rstrip()
+
+
 def unit_behind(words: str, units: str) -> str:
     """What a number is, and its unit: "tension (N)"."""
     return words if units == "1" else f"{words} ({unit_text(units)})"

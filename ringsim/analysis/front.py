@@ -23,11 +23,13 @@ from ringsim.files import whole, writing
 from ringsim.stepping.instant import Array
 from ringsim.tables import (
     Table,
+    amount_text,
     bound_text,
     counted,
     interval_text,
     number_text,
     readable,
+    unit_behind,
     unit_text,
 )
 from ringsim.variables import GOALS
@@ -252,7 +254,7 @@ def front_tables(found: "xr.Dataset") -> list[Table]:
 def _in_units(values: Array, units: str) -> tuple[Array, str]:
     known = values[np.isfinite(values)]
     factor, told = readable(units, float(np.abs(known).max()) if len(known) else 0.0)
-    return factor * values, f" ({unit_text(told)})" if unit_text(told) else ""
+    return factor * values, unit_behind("", told)
 
 
 def _designs(found: "xr.Dataset") -> Table:
@@ -270,8 +272,8 @@ def _designs(found: "xr.Dataset") -> Table:
             found[f"objective_{end}"].values[:, k] for end in ("value", "lower", "upper")
         )
         factor, told = readable(units, float(np.nanmax(np.abs(middle), initial=0.0)))
-        unit = f" ({unit_text(told)})" if unit_text(told) else ""
-        rows.append((f"{objective}{unit}", *(number_text(factor * v, 4) for v in middle)))
+        own = (number_text(factor * v, 4) for v in middle)
+        rows.append((unit_behind(str(objective), told), *own))
         rows.append(("95 %", *(
             interval_text(factor * a, factor * b) for a, b in zip(low, high, strict=True)
         )))  # fmt: skip
@@ -319,7 +321,7 @@ def _notes(found: "xr.Dataset", names: list[str]) -> list[str]:
     if not keeps.any():
         amounts = [f"{share:.2g} of its check samples fail" for share in lost[-1:] if share > 0.0]
         amounts += [
-            f"{bound} by {_amount(v, units)}" for bound, v, units in zip(
+            f"{bound} by {amount_text(v, units)}" for bound, v, units in zip(
                 found["bound"].values, far[-1], found["bound_units"].values, strict=True
             ) if v > 0.0
         ]  # fmt: skip
@@ -344,11 +346,6 @@ def _notes(found: "xr.Dataset", names: list[str]) -> list[str]:
     if at_edge:
         notes.append(f"at a bound, beyond which there may be better ones: {', '.join(at_edge)}")
     return notes
-
-
-def _amount(value: float, units: str) -> str:
-    factor, told = readable(str(units), abs(value))
-    return f"{factor * value:.3g} {unit_text(told)}".rstrip()
 
 
 def _at_bounds(found: "xr.Dataset") -> list[str]:
@@ -382,8 +379,8 @@ def _bought(found: "xr.Dataset") -> list[Table]:
                        found["bound_units"].values, strict=True)  # fmt: skip
             for bound, far, mine, units in each:
                 if far > 0.0:
-                    itself = f" ({name} itself by {_amount(mine, units)})" if mine > 0.0 else ""
-                    broken.append(f"{bound} by {_amount(far, units)}{itself}")
+                    itself = f" ({name} itself by {amount_text(mine, units)})" if mine > 0.0 else ""
+                    broken.append(f"{bound} by {amount_text(far, units)}{itself}")
             rows.append((str(variable), *cells, ", ".join(broken) or "-"))
         last = k == found.sizes["design"] - 1
         changes = (f"change of {each}" for each in found["objective"].values)

@@ -57,7 +57,7 @@ from ringsim.refusal import (
 from ringsim.sampling.table import first_inside, refuse_fixed
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
-from ringsim.tables import counted, readable, unit_text
+from ringsim.tables import amount_text, counted
 from ringsim.units import unit_at
 from ringsim.variables import GOALS, OF_CAMPAIGNS, Fate, Status
 
@@ -395,8 +395,7 @@ class _Course:
         words = []
         for aim, steered in zip(self.given.problem.objectives, best, strict=True):
             value = float(aim.shown(steered))
-            factor, unit = readable(aim.units, abs(value))
-            words.append(f"{aim.told} {factor * value:.4g} {unit_text(unit)}".rstrip())
+            words.append(f"{aim.told} {amount_text(value, aim.units, '.4g')}")
         return f", best so far: {', '.join(words)}"
 
     def _hopeless(self) -> str:

@@ -14,7 +14,7 @@ from matplotlib.ticker import LogLocator
 from ringsim.analysis.engines import OUTPUTS
 from ringsim.analysis.stability import AGREE, ENGINES, OK, WRONG, axis_label
 from ringsim.plots import style
-from ringsim.tables import readable, unit_behind, unit_text
+from ringsim.tables import amount_text, unit_behind
 
 # Error against cost: the work-precision figure of an accuracy study.
 
@@ -271,12 +271,9 @@ def _reached(axes: Axes, found: xr.Dataset) -> None:
 
 def _variables(axes: Axes, found: xr.Dataset) -> None:
     low, high = found["low"].values, found["high"].values
-    labels = [unit_behind(str(name), str(unit)) for name, unit in zip(
-        found["variable"].values, found["variable_units"].values, strict=True
-    )]  # fmt: skip
     places = (found["value"].values - low) / (high - low)
     told = [[f"{v:.4g}" for v in row] for row in found["value"].values]
-    _rows(axes, labels, places, told)
+    _rows(axes, _labels(found, "variable"), places, told)
     axes.set_xlim(-0.06, 1.06)
     axes.set_xticks([0.0, 1.0], ["low", "high"])
     axes.set_title("Variables: present (black) and chosen", fontsize=10)
@@ -285,22 +282,20 @@ def _variables(axes: Axes, found: xr.Dataset) -> None:
 def _bounds(axes: Axes, found: xr.Dataset) -> None:
     far = found["check_beyond"].values
     size = np.nanmax(np.abs(far), axis=0, initial=0.0)
-    told = []
-    for row in far:
-        factors = [readable(str(u), abs(float(v))) for u, v in zip(
-            found["bound_units"].values, row, strict=True
-        )]  # fmt: skip
-        told.append([f"{factor * v:+.3g} {unit_text(unit)}".rstrip()
-                     for v, (factor, unit) in zip(row, factors, strict=True)])  # fmt: skip
-    labels = [unit_behind(str(name), str(unit)) for name, unit in zip(
-        found["bound"].values, found["bound_units"].values, strict=True
-    )]  # fmt: skip
-    _rows(axes, labels, far / np.where(size > 0.0, size, 1.0), told)
+    units = found["bound_units"].values
+    told = [[amount_text(v, u, "+.3g") for v, u in zip(row, units, strict=True)] for row in far]
+    _rows(axes, _labels(found, "bound"), far / np.where(size > 0.0, size, 1.0), told)
     axes.axvline(0.0, color=style.INK, linewidth=1.1)
     axes.set_xlim(-1.25, 1.25)
     axes.set_xticks([-0.6, 0.0, 0.6], ["keeps to it", "bound", "breaks it"])
     axes.tick_params(axis="x", length=0)
     axes.set_title("Quantiles aimed at less the bounds (check samples)", fontsize=10)
+
+
+def _labels(found: xr.Dataset, dim: str) -> list[str]:
+    """Names along a dimension, each with its unit."""
+    both = zip(found[dim].values, found[f"{dim}_units"].values, strict=True)
+    return [unit_behind(str(name), str(unit)) for name, unit in both]
 
 
 def _rows(axes: Axes, labels: list[str], places: Any, told: list[list[str]]) -> None:

@@ -52,7 +52,7 @@ from ringsim.plots.campaign.frame import (
     standing,
 )
 from ringsim.plots.campaign.tornado import is_one_by_one
-from ringsim.tables import readable, unit_behind, with_unit
+from ringsim.tables import amount_text, unit_behind
 
 _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
@@ -147,8 +147,7 @@ _FAR = 0.3
 
 
 def _told(variable: xr.DataArray, limit: float) -> str:
-    factor, units = readable(str(variable.attrs.get("units", "1")), abs(limit))
-    return with_unit(f"{factor * limit:g}", units)
+    return amount_text(limit, str(variable.attrs.get("units", "1")), "g")
 
 
 _POINTS = 400
