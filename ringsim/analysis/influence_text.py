@@ -348,7 +348,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
         return Table((), ())
     rows, quiet, doubtful = list[tuple[str, ...]](), list[str](), list[str]()
     more, alone, open_ = list[str](), list[str](), list[str]()
-    separated, flat = _separated_groups(analysis), _flat(analysis)
+    separated = {group for group, chosen in separating(analysis) if chosen}
+    flat = _flat(analysis)
     for output, names, others in mattering(analysis):
         if is_moment(output) or output in flat:
             continue
@@ -593,8 +594,3 @@ def what_separates(analysis: xr.Dataset) -> Table:
         ]  # fmt: skip
     head = ("what separates", "input", *DIRECTED)
     return marked(Table(head, rows, left=3), analysis, 1)
-
-
-def _separated_groups(analysis: xr.Dataset) -> set[str]:
-    """The groups that some input separates, each by all of its names."""
-    return {group for group, chosen in separating(analysis) if chosen}

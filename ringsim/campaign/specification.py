@@ -451,10 +451,6 @@ def _as_drawn(pair: Correlation, inputs: Mapping[str, Any], scene: Scene) -> Cor
     return pair.model_copy(update={"between": (own(first), own(second))})
 
 
-def _median(law: Distribution) -> Any:
-    return plain(law.quantile(np.array([0.5]))[0])
-
-
 def load_campaign(
     path: Path, settings: Mapping[str, Any] | None = None, samples: int | None = None
 ) -> Campaign:
@@ -542,8 +538,9 @@ def campaign_of(
         raise InputError(f"{path.name}: {key}: {error}") from None
     for name in learnt:
         law = specification.inputs[name]
+        median = plain(law.quantile(np.array([0.5]))[0])
         try:
-            varied.with_values(dict.fromkeys(law.shared or (name,), _median(law)))
+            varied.with_values(dict.fromkeys(law.shared or (name,), median))
         except InputError as error:
             raise InputError(
                 f"{path.name}: inputs.from = {show(source)}: {name} of it is nothing that this "

@@ -38,7 +38,6 @@ from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
 from ringsim.scene.checks import doubtful
 from ringsim.scene.substituted import strained, substituted
 from ringsim.tables import counted, text_table, thousandths, unit_text
-from ringsim.units import Model
 from ringsim.variables import Variable
 
 SCHEMA = "scene.schema.json"
@@ -186,7 +185,7 @@ def _summary(scene: Scene) -> dict[str, str]:
         "friction": ", ".join(friction),
         "left out": ", ".join(name for name, out in absent.items() if out).replace("_", " ")
         or "nothing",
-        "solver": _fields(scene.solver),
+        "solver": _listed(scene.solver.model_dump()),
     }  # fmt: skip
 
 
@@ -255,10 +254,6 @@ def _mobility(layout: Layout) -> str:
     if len(layout.openings[0]) > MOST_SECTIONS_FOR_MOBILITY:
         return f"not computed above {MOST_SECTIONS_FOR_MOBILITY} sections"
     return f"{counted(internal_mobility(layout), 'internal degree')} of freedom with rigid rods"
-
-
-def _fields(part: Model) -> str:
-    return _listed(part.model_dump())
 
 
 def _listed(table: dict[str, Any]) -> str:

@@ -171,16 +171,15 @@ _STILL = 1e-6
 _LOADS = ("base_force", "base_torque")
 
 
-def _based(dataset: xr.Dataset) -> bool:
-    return _moves(dataset) or bool(_loads(dataset))
-
-
 def _loads(dataset: xr.Dataset) -> list[xr.DataArray]:
     return [dataset[name] for name in _LOADS
             if name in dataset and np.isfinite(dataset[name]).any()]  # fmt: skip
 
 
-@picture("run", 118, "Attitude and place of the base, force and torque on it", applies=_based)
+@picture(
+    "run", 118, "Attitude and place of the base, force and torque on it",
+    applies=lambda dataset: _moves(dataset) or bool(_loads(dataset)),
+)  # fmt: skip
 def base(dataset: xr.Dataset) -> Figure:
     """Of a base that moves ``base_rotation`` (axis, time), of a spacecraft ``base_rate``, too, and,
     where positions are recorded, how far the boom's upper end has moved since the start;

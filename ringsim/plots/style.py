@@ -314,10 +314,6 @@ def locked_time(dataset: xr.Dataset) -> float:
     return math.nan if missed else deployment_time(dataset)
 
 
-def _all_of(dataset: xr.Dataset) -> str:
-    return "all locked" if math.isfinite(locked_time(dataset)) else "all at 180 deg"
-
-
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
     status, fate = Status(int(dataset["status"])), Fate(int(dataset.get("outcome", Fate.NONE)))
@@ -457,8 +453,9 @@ def time_axes(
         axes.axvline(moment, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
     if named:
         side = "right" if moment > 0.5 * sum(panels[0].get_xlim()) else "left"
+        done = "all locked" if math.isfinite(locked_time(dataset)) else "all at 180 deg"
         panels[0].annotate(
-            f"{_all_of(dataset)} at {_moment(dataset, moment)}", (moment, 1.0),
+            f"{done} at {_moment(dataset, moment)}", (moment, 1.0),
             xycoords=panels[0].get_xaxis_transform(), xytext=(0, 3),
             textcoords="offset points", ha=side, va="bottom", fontsize=9.5,
         )  # fmt: skip

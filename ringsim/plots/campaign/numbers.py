@@ -306,11 +306,6 @@ _MANY = 500
 """Samples from which on marks are drawn as dots: as shapes they would make a page too large."""
 
 
-def _has_run(campaign: xr.Dataset) -> bool:
-    """Whether something became of drawn inputs."""
-    return bool(inputs(campaign)) and bool(ran(campaign).any())
-
-
 def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     """An input as one number a sample: the mean of its places, or the place of its word in the
     list that comes second, which is empty for numbers: numbers by size, then words.
@@ -338,11 +333,9 @@ _NAMED = 4
 
 
 @picture(
-    "campaign",
-    80,
-    "The main number of each sample and its outcome, by each drawn input",
-    applies=lambda campaign: _has_run(campaign) and not is_one_by_one(campaign),
-)
+    "campaign", 80, "The main number of each sample and its outcome, by each drawn input",
+    applies=lambda c: inputs(c) and ran(c).any() and not is_one_by_one(c),
+)  # fmt: skip
 def by_input(campaign: xr.Dataset) -> Figure:
     """A panel an input: the main number of each sample that has run over the value drawn for it;
     of more inputs than a sheet has room for those of words and those that go with it most.
