@@ -6,6 +6,7 @@ from enum import IntEnum
 from typing import Any, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 PLANES = ("upper", "lower")
 OF_CAMPAIGNS = "[outputs] of a campaign file"
@@ -37,6 +38,11 @@ class Code(IntEnum):
 def about(long_name: str, units: str = "1") -> dict[str, Any]:
     """The CF attributes that tell what a variable is."""
     return {"long_name": long_name, "units": units}
+
+
+def texts_about(texts: Iterable[Any], long_name: str) -> tuple[NDArray[Any], dict[str, str]]:
+    """Texts as files take them, and the CF attribute that tells what they are."""
+    return np.array([*texts], dtype=object), {"long_name": long_name}
 
 
 def flags_of(codes: Iterable[Code]) -> dict[str, Any]:

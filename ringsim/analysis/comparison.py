@@ -43,7 +43,7 @@ from ringsim.overrides import flat, with_names
 from ringsim.refusal import InputError, show
 from ringsim.sampling.distributions import law_text
 from ringsim.tables import where_apart
-from ringsim.variables import about, flags_of
+from ringsim.variables import about, flags_of, texts_about
 
 Both = tuple[xr.Dataset, xr.Dataset]
 Placements = tuple[Placement, Placement]
@@ -80,13 +80,10 @@ def differences_of_shares(both: Both, placed: Placements, pairs: Places) -> dict
         kind: Event((words[0] == kind, words[1] == kind), ran if kind.startswith(LOST) else held)
         for kind in sorted({*words[0].tolist(), *words[1].tolist()})
     }
-    found: dict[str, Any] = {
-        "kind": ("kind", np.array([*kinds], dtype=object), {"long_name": "how it ended"})
-    }
+    found: dict[str, Any] = {"kind": ("kind", *texts_about(kinds, "how it ended"))}
     found |= _told("kind", "kind", kinds, placed, both, pairs)
     if kept := _kept(both, held):
-        texts = np.array([*kept], dtype=object)
-        found["requirement"] = "requirement", texts, {"long_name": "requirement of both"}
+        found["requirement"] = "requirement", *texts_about(kept, "requirement of both")
         found |= _told("kept", "requirement", kept, placed, both, pairs)
         codes, texts = _verdicts(both, placed, [*kept])
         both_sides, says = ("requirement", "side"), "verdict on the requirement"
@@ -377,8 +374,7 @@ def settings(both: Both) -> dict[str, Any]:
     for k, (side, scene) in enumerate(zip(SIDES, scenes, strict=True)):
         told = [each[k] for each in words]
         told += [show(scene[path], _LONGEST) if path in scene else "none" for path in apart]
-        about_it = {"long_name": f"value in the {side}"}
-        found[f"setting_{side}"] = "setting", np.array(told, dtype=object), about_it
+        found[f"setting_{side}"] = "setting", *texts_about(told, f"value in the {side}")
     return found
 
 
@@ -590,8 +586,6 @@ def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any
             "change", dataset["sample"].to_numpy()[place[changed]],
             about(f"sample of the {side} whose outcome is another"),
         )  # fmt: skip
-        found[f"changed_outcome_{side}"] = (
-            "change", words[changed].astype(object),
-            {"long_name": f"how the sample of the {side} ended"},
-        )  # fmt: skip
+        ended = texts_about(words[changed].tolist(), f"how the sample of the {side} ended")
+        found[f"changed_outcome_{side}"] = "change", *ended
     return found

@@ -27,7 +27,7 @@ from ringsim.analysis.tails import subset_simulation
 from ringsim.refusal import InputError
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted
-from ringsim.variables import about
+from ringsim.variables import about, texts_about
 
 # Pairs of inputs that go together, so that the effect of one may be taken for the other's.
 
@@ -101,12 +101,10 @@ def confounded(inputs: Drawn, used: NDArray[np.bool_], cure: str) -> dict[str, A
     found = pairs(inputs.values[used], _apart(inputs))
     if not found:
         return {}
-    names = np.array(inputs.names, dtype=object)
-    columns = {
-        "first": (names[[each.first for each in found]], {"long_name": "first input of the pair"}),
-        "second": (
-            names[[each.second for each in found]], {"long_name": "second input of the pair"},
-        ),
+    names = inputs.names
+    columns: dict[str, tuple[Any, dict[str, Any]]] = {
+        "first": texts_about((names[each.first] for each in found), "first input of the pair"),
+        "second": texts_about((names[each.second] for each in found), "second input of the pair"),
         "correlation": (
             [each.correlation for each in found],
             about("rank correlation of the two inputs") | {"cure": cure},
@@ -240,10 +238,7 @@ def influence(
         "input", _held(np.array(inputs.level)),
         about("number of other inputs whose effect the partial correlation removes"),
     )  # fmt: skip
-    found["input_of"] = (
-        "input", np.array(inputs.input, dtype=object),
-        {"long_name": "drawn input that it belongs to"},
-    )  # fmt: skip
+    found["input_of"] = "input", *texts_about(inputs.input, "drawn input that it belongs to")
     found["input_span"] = (
         ("input", "bound"), np.array(inputs.span, dtype="i8"),
         about("first of its sections (pulleys, ...), and the one after the last"),

@@ -67,7 +67,7 @@ from ringsim.tables import (
     number_text,
     with_unit,
 )
-from ringsim.variables import about
+from ringsim.variables import about, texts_about
 
 _LEAST_OF_A_KIND = 10
 """Samples that failed, and that did not, below which failure is no output to analyse."""
@@ -251,8 +251,8 @@ def _dataset(
         coords={"output": np.array([*outputs], dtype=object), "bound": ["lower", "upper"]}
         | {name: np.array(each, dtype=object) for name, each in coords.items()}
     )
-    made["output_units"] = "output", np.array([u for _, u in outputs.values()], dtype=object)
-    made["output_units"].attrs = {"long_name": "unit of the output and of the effects"}
+    units = [unit for _, unit in outputs.values()]
+    made["output_units"] = "output", *texts_about(units, "unit of the output and of the effects")
     first: Found = next(iter(found.values()), {})
     for name, (dims, shape) in first.items():
         values = np.full((len(outputs), *shape.shape), np.nan)
@@ -521,9 +521,8 @@ def rarer(
     why = "; ".join(f"{', '.join(names)} ({each})" for each, names in left.items())
     untold = np.array(why, dtype=object)  # so that files take it as text
     says = "input whose distribution is another", "what of it", "as drawn, and as it would be"
-    columns = [np.array([each[k] for each in found], dtype=object) for k in range(3)]
     texts = {
-        f"change_{Change._fields[k]}": ("change", columns[k], {"long_name": says[k]})
+        f"change_{Change._fields[k]}": ("change", *texts_about([e[k] for e in found], says[k]))
         for k in range(3)
     }
     dims, bars = ("requirement", "change"), about(f"95 % interval of the {words}")

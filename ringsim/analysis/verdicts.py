@@ -46,7 +46,7 @@ from ringsim.analysis.requirements import (
     violations,
 )
 from ringsim.tables import Table, bound_text, counted, number_text, with_unit
-from ringsim.variables import GO_ON, GOALS, Code, Fate, about, flags_of
+from ringsim.variables import GO_ON, GOALS, Code, Fate, about, flags_of, texts_about
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,9 +119,7 @@ def judge(
     }
     told = [each.told(name) for name, each in requirements.items()]
     table = xr.Dataset(known, coords={"requirement": np.array([*requirements], dtype=object)})
-    table["requirement_text"] = (
-        "requirement", np.array(told, dtype=object), {"long_name": "requirement in words"}
-    )  # fmt: skip
+    table["requirement_text"] = "requirement", *texts_about(told, "requirement in words")
     for name in ("verdict", "verdict_of_used"):
         table[name].attrs |= flags_of(Verdict)
     return table.assign(_together(campaign, requirements, placed, rule))

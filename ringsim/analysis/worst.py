@@ -35,7 +35,7 @@ from ringsim.outputs.balance import exceeded
 from ringsim.overrides import flat
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted, number_text, readable, with_unit
-from ringsim.variables import GO_ON, Fate, about
+from ringsim.variables import GO_ON, Fate, about, texts_about
 
 # What is unusual in the inputs of a sample, in words.
 
@@ -329,14 +329,13 @@ def worst(
         return xr.Dataset()
     failures, failed, of, found = zip(*rows, strict=True)
     columns: dict[str, tuple[Any, dict[str, Any]]] = {
-        "failure": (np.array(failures, dtype=object), {"long_name": "what failed"}),
+        "failure": texts_about(failures, "what failed"),
         "failed": (np.array(failed), about("number of samples with this failure")),
         "of": (np.array(of), about("samples that have run")),
         "sample": (campaign["sample"].to_numpy()[chosen], about("one of the worst of these")),
-        "found": (np.array(found, dtype=object), {"long_name": "its value, or why the run ended"}),
-        "inputs": (np.array(unusual(campaign, chosen, sides, whole), dtype=object),
-                   {"long_name": "its unusual inputs"}),
-    }  # fmt: skip
+        "found": texts_about(found, "its value, or why the run ended"),
+        "inputs": texts_about(unusual(campaign, chosen, sides, whole), "its unusual inputs"),
+    }
     return xr.Dataset({f"worst_{name}": ("worst", *each) for name, each in columns.items()})
 
 
@@ -533,9 +532,9 @@ def margins(campaign: xr.Dataset, plane: str = "") -> xr.Dataset:
         return xr.Dataset()
     texts, names, told_of, margin, value, places, beyond, of_all = zip(*rows, strict=True)
     columns = {
-        "text": (np.array(texts, dtype=object), {"long_name": "limit of the scene"}),
-        "output": (np.array(names, dtype=object), {"long_name": "output that it bounds"}),
-        "of": (np.array(told_of, dtype=object), {"long_name": "what has the worst value"}),
+        "text": texts_about(texts, "limit of the scene"),
+        "output": texts_about(names, "output that it bounds"),
+        "of": texts_about(told_of, "what has the worst value"),
         "margin": (np.array(margin), about("limit over the worst value, less 1; drive margin")),
         "value": (np.array(value), about("worst value of all samples, in the output's unit")),
         "sample": (campaign["sample"].to_numpy()[[*places]], about("sample with that value")),
