@@ -31,7 +31,6 @@ from ringsim.scene import scene_from_toml
 from ringsim.shapes import ByLine, Shape, shape_of
 from ringsim.tables import unit_text
 
-COLOURS = ("lag", "stress")
 FRAMES, RATE, HELD = 120, 15, 1.5
 """Frames of the motion, frames a second, and how long (s) the last one stays."""
 _SAMPLED = 8
