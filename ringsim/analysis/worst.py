@@ -550,7 +550,7 @@ def _ratios(campaign: xr.Dataset) -> Iterator[tuple[str, str, str, Any, Array, A
     """
     scene = flat(tomllib.loads(str(campaign.attrs.get("scene", ""))))
     own = by_path(campaign)
-    for limit, peak, series in _limited():
+    for limit, peak, series in limited():
         path = f"limits.{limit}"
         if peak not in campaign or (path not in scene and path not in own):
             continue
@@ -564,7 +564,7 @@ def _ratios(campaign: xr.Dataset) -> Iterator[tuple[str, str, str, Any, Array, A
             yield path, peak, series, allowed, values, ratio
 
 
-def _limited() -> Iterator[tuple[str, str, str]]:
+def limited() -> Iterator[tuple[str, str, str]]:
     """Limits of loads by their names, with the output that each bounds, and its series."""
     for output in OUTPUTS:
         for one in output.variables if output.limit else ():

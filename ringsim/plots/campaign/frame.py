@@ -37,8 +37,7 @@ from ringsim.analysis.intervals import (
     varies,
 )
 from ringsim.analysis.requirements import required_by, without_twins
-from ringsim.analysis.worst import labels, one_at_a_time
-from ringsim.outputs import OUTPUTS
+from ringsim.analysis.worst import labels, limited, one_at_a_time
 from ringsim.outputs.base import DOUBT
 from ringsim.outputs.family import VARIABLES, Array
 from ringsim.plots import style
@@ -151,13 +150,8 @@ def allowables(campaign: xr.Dataset) -> dict[str, float]:
         return {}
     scene = scene_from_toml(text, source="attribute scene")
     drawn = by_path(campaign)
-    bounds = {
-        one.name: output.limit for output in OUTPUTS if output.limit
-        for one in output.variables if one.largest_of == output.variables[0].name
-    }  # fmt: skip
-    bounds["longest_slack"] = "slack_duration"
     found = {
-        name: getattr(scene.limits, limit) for name, limit in bounds.items()
+        name: getattr(scene.limits, limit) for limit, name, _ in limited()
         if name in campaign and f"limits.{limit}" not in drawn
     }  # fmt: skip
     return {name: float(limit) for name, limit in found.items() if limit is not None}
