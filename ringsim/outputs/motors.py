@@ -436,10 +436,7 @@ class Effort(Output):
         ),
         _number("total_newton_iterations", "Newton iterations of all attempts"),
         _number("total_jacobians", "Jacobian factorisations of all attempts"),
-        _number(
-            "fidelity",
-            "model: 0 full multibody, 2 rods in joint coordinates",
-        ),
+        _number("fidelity", "model: 0 full multibody, 2 rods in joint coordinates"),
         Variable("step_used", (), "s", "largest step allowed, solver.step, of the last attempt"),
         Variable("tolerance_used", (), "1", "solver.tolerance of the last attempt"),
         Variable("final_time", (), "s", "time at which the run ended"),
