@@ -31,7 +31,7 @@ from ringsim.campaign.specification import Campaign, Stages, campaign_of, refuse
 from ringsim.files import DESIGN, parse_toml, read_text, whole, writing
 from ringsim.measured import Measurement, Told, load_measured
 from ringsim.overrides import at_path
-from ringsim.refusal import EXIT_INTERRUPTED, InputError, explain
+from ringsim.refusal import InputError, explain
 from ringsim.sampling.columns import Axis, Unknowns, add_inputs, alike, correlate, marks, pairs_of
 from ringsim.sampling.designs.independent import sobol_points
 from ringsim.sampling.distributions import Array, Calibrated, Ranged, inside
@@ -572,8 +572,5 @@ class Calibration:
     def _run(self, workers: int | None, out: str | Path | None, *, planning: bool) -> xr.Dataset:
         folder = None if out is None else Path(out)
         ended, path = run_course(lambda: self._given, workers, folder, planning=planning)
-        if ended.refused is not None:
-            raise ended.refused
-        if ended.code == EXIT_INTERRUPTED:
-            raise KeyboardInterrupt
+        ended.require_end()
         return xr.load_dataset(path)

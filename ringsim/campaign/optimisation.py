@@ -46,14 +46,7 @@ from ringsim.files import parse_toml, read_text, write_text, writing
 from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, holds, supply
 from ringsim.overrides import field_at, flat, in_turn, with_number
-from ringsim.refusal import (
-    EXIT_FAILED,
-    EXIT_INTERRUPTED,
-    InputError,
-    explain,
-    known_or_nearest,
-    show,
-)
+from ringsim.refusal import EXIT_FAILED, InputError, explain, known_or_nearest, show
 from ringsim.sampling.table import first_inside, refuse_fixed
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
@@ -574,8 +567,5 @@ class Optimisation:
         """
         folder = None if out is None else Path(out)
         ended, path = run_optimisation(lambda: self._given, workers, folder)
-        if ended.refused is not None:
-            raise ended.refused
-        if ended.code == EXIT_INTERRUPTED:
-            raise KeyboardInterrupt
+        ended.require_end()
         return xr.load_dataset(path)

@@ -190,8 +190,7 @@ class Campaign:
             return order
 
         ended = start(workers, placed, lambda _: None)
-        if ended.refused is not None:
-            raise ended.refused
+        ended.require_end()
         return self._opened(order.folder, ended.code)
 
     def _run_on(self, executor: Executor, workers: int | None, order: Order) -> int:

@@ -466,6 +466,13 @@ class Ended(NamedTuple):
     first: bool = True
     """Whether this is rank 0, who tells."""
 
+    def require_end(self) -> None:
+        """Raise why it was refused, or KeyboardInterrupt after a signal."""
+        if self.refused is not None:
+            raise self.refused
+        if self.code == EXIT_INTERRUPTED:
+            raise KeyboardInterrupt
+
 
 def require_no_launcher(workers: int | None) -> None:
     """Refuse (InputError) a number of workers under an MPI launcher."""
