@@ -76,6 +76,7 @@ GOOD_SCENES = [
     ("cables/upper/slip_speed", "none"),
     ("faults", [{"kind": "cut-cable", "cable": "lower", "span": SPAN, "time": 1}]),
     ("stop", {"stiffness": 100}),  # its only kind is the default
+    ("rods", {"elements": 2}),  # of the default kind
 ]  # fmt: skip
 BAD_SCENES = [
     ("structure/sectoins", 3),
@@ -89,7 +90,6 @@ BAD_SCENES = [
     ("cables/upper/friction/coefficient", {"section 6 V": 0.002}),
     ("solver", "none"),
     ("boom", {"length": 0.9}),  # of no kind
-    ("rods", {"elements": 2}),  # of the default kind
 ]
 
 
