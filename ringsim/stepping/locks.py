@@ -76,20 +76,13 @@ class Locks(Remembering):
         self.stops = stowed_angle is not None
         self._stowed_angle = stowed_angle or 0.0
         self.deployed, self.stowed = np.zeros((2, *angles.shape), dtype=bool)
-        self._known, self._ends = angles, (float(angles.min()), float(angles.max()))
         self._away = angles > self._stowed_angle + _APART
         self.reached = Fate.NONE
 
-    def _ends_of(self, angles: Array) -> tuple[float, float]:
-        """The smallest and the largest angle, for which all that follows ask of each step."""
-        if angles is not self._known:
-            self._known, self._ends = angles, (float(angles.min()), float(angles.max()))
-        return self._ends
-
     def note(self, angles: Array) -> None:
         """Remember the joints that have reached a stop; opening angles in rad."""
-        (low, high), stop = self._ends_of(angles), self._stowed_angle
-        if high >= math.pi:
+        low, stop = float(angles.min()), self._stowed_angle
+        if angles.max() >= math.pi:
             self.deployed |= angles >= math.pi
         if low <= stop:
             self.stowed |= self._away & (angles <= stop)
@@ -111,7 +104,7 @@ class Locks(Remembering):
         that and this step goes on for long behind it; or one that leads towards a latch of which
         this one leaves open whether it catches; else None.  None is below ``least`` (s).
         """
-        if not self._ends_of(found.angles)[1] >= math.pi:
+        if not found.angles.max() >= math.pi:
             return None
         step, wanted = found.time - before.time, list[float]()
         for row in self._acted_on:
@@ -146,8 +139,8 @@ class Locks(Remembering):
 
     def overrun(self, now: Instant) -> Overrun:
         """The V-joint that is farthest past its stop; 0 where there are none."""
-        (least, most), low, high = self._ends_of(now.angles), self._stowed_angle, math.pi
-        if not self.stops or (most <= high and least >= low):
+        low, high = self._stowed_angle, math.pi
+        if not self.stops or (now.angles.max() <= high and now.angles.min() >= low):
             return Overrun()
         past: Array = np.maximum(now.angles - high, low - now.angles)
         plane, section = divmod(int(past.argmax()), past.shape[1])
@@ -190,7 +183,7 @@ class Locks(Remembering):
         first = int(waiting.argmin())
         time_to_next, rate_of_next = float(waiting.flat[first]), abs(float(rates.flat[first]))
         # Most of a run no V-joint is anywhere near a stop that it has reached.
-        if not some and self._ends_of(angles)[0] >= low + _NEAR:
+        if not some and angles.min() >= low + _NEAR:
             return StopContact(time_to_next, rate_of_next)
         resting = self.deployed & (angles > high - _NEAR)
         if self.stops:
