@@ -146,8 +146,8 @@ _MOST = 60
 _BALANCED = 1e-8
 """Force (N) that may be out of balance on a frame; a scene's loads are a million times as large."""
 _ROUNDED = 16.0 * sys.float_info.epsilon
-"""The same over the stiffness of the stiffest rod, m: round-off leaves half an epsilon of rings of
-3 sections and one of 72, of tubes of 12 and of 100 mm."""
+"""The same over the stiffness of the stiffest rod, m.  Round-off alone leaves half an epsilon in a
+ring of 3 sections and one in a ring of 72, with tubes of 12 and of 100 mm."""
 _CLOSED = 1e-12
 """Gap (m) and tilt of a joint that is round-off."""
 _WEAK = 1e-9
