@@ -143,7 +143,7 @@ class Winch(Model):
         return [*(time for time in bends if time < self.stop_time), self.stop_time]
 
     def jumps(self) -> set[float]:
-        """Times (s) at which the winch starts or stops, or the speed that its law prescribes jumps."""
+        """Times (s) at which the winch starts or stops, or its prescribed speed jumps."""
         found = {self.start_time} if self.stop_time is None else {self.start_time, self.stop_time}
         slight = _JUMP * self.winding.usual_speed()
         for time in self.breaks():
